@@ -1,0 +1,127 @@
+# Copyright 2026 lmsco_ros contributors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Plain values that enter and leave the tracker."""
+
+from dataclasses import dataclass
+from enum import Enum
+import math
+
+from lmsco_ros.core.errors import BoxError
+import numpy as np
+import numpy.typing as npt
+
+
+@dataclass(frozen=True)
+class BoundingBox:
+    """
+    Axis-aligned box in image pixels; pixel (0, 0) covers [0, 1) x [0, 1).
+
+    Parameters
+    ----------
+    x, y : float
+        Top-left corner, in pixels.
+    width, height : float
+        Size in pixels, both positive.
+
+    Raises
+    ------
+    BoxError
+        When a number is not finite or a side is not positive.
+    """
+
+    x: float
+    y: float
+    width: float
+    height: float
+
+    def __post_init__(self) -> None:
+        """Refuse boxes that enclose no area."""
+        if not all(math.isfinite(v) for v in (self.x, self.y, self.width, self.height)):
+            raise BoxError(f'box {self.as_tuple()} has a number that is not finite; '
+                           'give four finite numbers x, y, width, height in pixels')
+        if self.width <= 0 or self.height <= 0:
+            raise BoxError(f'box {self.as_tuple()} is empty; '
+                           'width and height must be positive (in pixels)')
+
+    @classmethod
+    def from_center(cls, center: tuple[float, float],
+                    size: tuple[float, float]) -> 'BoundingBox':
+        """Return the box of `size` (width, height) around `center` (x, y)."""
+        return cls(center[0] - size[0] / 2, center[1] - size[1] / 2, size[0], size[1])
+
+    @property
+    def center(self) -> tuple[float, float]:
+        """Center (x, y) in pixels."""
+        return self.x + self.width / 2, self.y + self.height / 2
+
+    @property
+    def size(self) -> tuple[float, float]:
+        """Size (width, height) in pixels."""
+        return self.width, self.height
+
+    @property
+    def area(self) -> float:
+        """Area in square pixels."""
+        return self.width * self.height
+
+    def as_tuple(self) -> tuple[float, float, float, float]:
+        """Return (x, y, width, height)."""
+        return self.x, self.y, self.width, self.height
+
+    def intersection(self, other: 'BoundingBox') -> float:
+        """Return the common area with `other` in square pixels."""
+        width = min(self.x + self.width, other.x + other.width) - max(self.x, other.x)
+        height = min(self.y + self.height, other.y + other.height) - max(self.y, other.y)
+        return max(width, 0.0) * max(height, 0.0)
+
+    def overlap(self, other: 'BoundingBox') -> float:
+        """Return intersection over union with `other`, in [0, 1]."""
+        common = self.intersection(other)
+        return common / (self.area + other.area - common)
+
+
+class TrackState(Enum):
+    """What the tracker believes about its target."""
+
+    TRACKING = 'tracking'
+    UNCERTAIN = 'uncertain'
+    LOST = 'lost'
+
+
+@dataclass(frozen=True)
+class TrackResult:
+    """
+    Outcome of one frame.
+
+    Attributes
+    ----------
+    box : BoundingBox
+        Estimated target box; the last trusted one while `state` is LOST.
+    score : float
+        Trust in `box`, in [0, 1].
+    state : TrackState
+        TRACKING, UNCERTAIN (found, but not learned from) or LOST.
+    confidence_map : ndarray, shape (n, n), float32
+        Score of the structured correlation filter over `search_region` at the
+        winning scale; cell (i, j) covers one n-th of the region in each direction.
+    search_region : BoundingBox
+        Region of the image that `confidence_map` covers; may exceed the image.
+    """
+
+    box: BoundingBox
+    score: float
+    state: TrackState
+    confidence_map: npt.NDArray[np.float32]
+    search_region: BoundingBox
