@@ -1,0 +1,77 @@
+# Copyright 2026 lmsco_ros contributors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""What every test may rely on: a private ROS graph, test data, reproducible properties."""
+
+import os
+from pathlib import Path
+import re
+import zlib
+
+from hypothesis import HealthCheck, settings
+import pytest
+
+REPOSITORY = Path(__file__).resolve().parents[1]
+# Domains above 101 need ports of the range that Linux hands to outgoing connections.
+LAST_DOMAIN = 101
+
+
+def ros_domain_id(run: str, worker: str, workers: int) -> int:
+    """
+    Give each parallel worker of a test run a ROS domain of its own.
+
+    Parameters
+    ----------
+    run : str
+        Anything that tells two runs on one machine apart.
+    worker : str
+        The name pytest-xdist gives the worker (`gw0`, `gw1`, ...), or `master`.
+    workers : int
+        Number of workers of the run, 0 without pytest-xdist.
+
+    Returns
+    -------
+    int
+        A domain between 1 and 101; two workers of one run never share it.
+
+    """
+    block = workers + 1
+    start = zlib.crc32(run.encode()) % (LAST_DOMAIN // block) * block
+    number = re.search(r'\d+', worker)
+    return 1 + start + (int(number.group()) + 1 if number else 0)
+
+
+# The ROS libraries read both variables when the first context starts, so they are set here, on
+# collection, before any test module can import rclpy.
+os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
+os.environ['ROS_DOMAIN_ID'] = str(ros_domain_id(
+    os.environ.get('PYTEST_XDIST_TESTRUNUID', str(os.getpid())),
+    os.environ.get('PYTEST_XDIST_WORKER', 'master'),
+    int(os.environ.get('PYTEST_XDIST_WORKER_COUNT', 0)),
+))
+
+settings.register_profile(
+    'local', deadline=None, max_examples=50,
+    suppress_health_check=[HealthCheck.too_slow])
+settings.register_profile('ci', settings.get_profile('local'), derandomize=True)
+settings.load_profile('ci' if os.environ.get('CI') else 'local')
+
+
+@pytest.fixture(scope='session')
+def test_data() -> Path:
+    """Return the root of the real thermal sequences, or skip with the way to provide them."""
+    root = Path(os.environ.get('LMSCO_TEST_DATA', REPOSITORY.parent / 'shared' / 'data'))
+    if not root.is_dir():
+        pytest.skip(f'no thermal sequences in {root}; set LMSCO_TEST_DATA to their folder')
+    return root
