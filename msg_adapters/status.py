@@ -1,0 +1,154 @@
+# Copyright 2026 lmsco_ros contributors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Status: `diagnostic_msgs/DiagnosticArray` <-> plain values."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from enum import IntEnum
+
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from std_msgs.msg import Header
+
+from msg_adapters.errors import StatusMessageError
+
+
+class Level(IntEnum):
+    """How well things are, as in DiagnosticStatus."""
+
+    OK = 0
+    WARN = 1
+    ERROR = 2
+    STALE = 3
+
+
+@dataclass(frozen=True)
+class Diagnosis:
+    """One entry of a DiagnosticArray: who is how well, in one line and in figures."""
+
+    name: str
+    level: Level
+    message: str
+    values: Mapping[str, str] = field(default_factory=dict)
+    hardware_id: str = ''
+
+
+@dataclass(frozen=True)
+class FrameStatus:
+    """
+    What a tracker says about one frame.
+
+    Attributes
+    ----------
+    state : str
+        One word, such as tracking, uncertain, lost or idle.
+    track_id : int
+        Grows with every start; 0 before the first.
+    score : float or None
+        Trust in the box, in [0, 1]; None without a box.
+    latency_ms : float
+        From the arrival of the frame to the answer, in milliseconds.
+    tracker_ms : float
+        The tracker's own share of it, in milliseconds.
+    dropped_frames : int
+        Frames that were skipped since the node became active.
+    level : Level
+    message : str
+        For people: what is wrong and what to do, or the state.
+
+    """
+
+    state: str
+    track_id: int
+    score: float | None
+    latency_ms: float
+    tracker_ms: float
+    dropped_frames: int
+    level: Level = Level.OK
+    message: str = ''
+
+
+def message_from_diagnoses(diagnoses: Iterable[Diagnosis],
+                           header: Header | None = None) -> DiagnosticArray:
+    """Return a DiagnosticArray with one entry for each diagnosis."""
+    return DiagnosticArray(header=header or Header(), status=[
+        DiagnosticStatus(
+            level=bytes([diagnosis.level]), name=diagnosis.name, message=diagnosis.message,
+            hardware_id=diagnosis.hardware_id,
+            values=[KeyValue(key=key, value=value) for key, value in diagnosis.values.items()])
+        for diagnosis in diagnoses])
+
+
+def diagnoses_from_message(message: DiagnosticArray) -> list[Diagnosis]:
+    """
+    Return the entries of a DiagnosticArray.
+
+    Raises
+    ------
+    StatusMessageError
+        When a level is none of the four.
+
+    """
+    return [Diagnosis(status.name, _level(status), status.message,
+                      {pair.key: pair.value for pair in status.values}, status.hardware_id)
+            for status in message.status]
+
+
+def message_from_status(status: FrameStatus, name: str,
+                        header: Header | None = None) -> DiagnosticArray:
+    """Return the status of one frame, under the name of the node that says it."""
+    score = '' if status.score is None else repr(float(status.score))
+    return message_from_diagnoses([Diagnosis(name, status.level, status.message, {
+        'state': status.state,
+        'track_id': str(status.track_id),
+        'score': score,
+        'latency_ms': repr(float(status.latency_ms)),
+        'tracker_ms': repr(float(status.tracker_ms)),
+        'dropped_frames': str(status.dropped_frames),
+    })], header)
+
+
+def status_from_message(message: DiagnosticArray) -> FrameStatus:
+    """
+    Return the status of the frame that `message` speaks of.
+
+    Raises
+    ------
+    StatusMessageError
+        When the message was not made by :func:`message_from_status`.
+
+    """
+    diagnoses = diagnoses_from_message(message)
+    try:
+        diagnosis, = diagnoses
+        values = diagnosis.values
+        return FrameStatus(
+            values['state'], int(values['track_id']),
+            float(values['score']) if values['score'] else None,
+            float(values['latency_ms']), float(values['tracker_ms']),
+            int(values['dropped_frames']), diagnosis.level, diagnosis.message)
+    except (KeyError, ValueError) as error:
+        raise StatusMessageError(
+            f'the message is no frame status ({error}); expected one entry with state, '
+            'track_id, score, latency_ms, tracker_ms and dropped_frames') from error
+
+
+def _level(status: DiagnosticStatus) -> Level:
+    try:
+        return Level(status.level[0])
+    except ValueError:
+        raise StatusMessageError(f'status "{status.name}" has the level {status.level[0]}; '
+                                 'expected 0 (ok) to 3 (stale)') from None
