@@ -1,0 +1,19 @@
+# PYTHON=/path/to/python3.11 chooses the interpreter; PYTEST_ARGS adds to the test run.
+BOOTSTRAP_PYTHON = $(shell command -v $(or $(PYTHON),python3))
+BIN = .venv/bin
+PYTEST_ARGS ?= -n 2
+
+.PHONY: demo test lint venv
+
+demo: venv
+	$(BIN)/lmsco demo
+
+test: venv
+	$(BIN)/python -m pytest $(PYTEST_ARGS)
+
+lint: venv
+	$(BIN)/python -m pytest test/package/test_lint.py
+
+venv:
+	@test -n "$(BOOTSTRAP_PYTHON)" || { echo 'lmsco_ros: $(or $(PYTHON),python3) is not there; install it: sudo apt install python3 python3-venv' >&2; exit 1; }
+	@'$(BOOTSTRAP_PYTHON)' scripts/bootstrap.py
