@@ -57,6 +57,7 @@ setup(
             'ros-jazzy-common-interfaces>=5.3,<6',
         ],
         'peers': ['opencv-contrib-python-headless>=4.9,<6'],
+        'vot': ['vot-trax==4.0.2'],
         'test': [
             'colcon-common-extensions>=0.3,<1',
             'colcon-ros>=0.5,<1',
