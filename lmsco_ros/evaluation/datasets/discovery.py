@@ -1,0 +1,100 @@
+# Copyright 2026 lmsco_ros contributors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Find the sequences below a folder, whatever layout each of them has."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Iterator, Union
+
+from lmsco_ros.evaluation.datasets.frames import ImageFiles
+from lmsco_ros.evaluation.datasets.layouts import READERS
+from lmsco_ros.evaluation.datasets.sequence import TrackingSequence
+from lmsco_ros.evaluation.errors import DatasetError, SequenceError
+
+_MAX_DEPTH = 3
+_FRAME_FOLDERS = ('ir', 'img', 'color', 'infrared')
+
+
+@dataclass(frozen=True)
+class BrokenSequence:
+    """A folder that looks like a sequence but cannot be used, and why."""
+
+    name: str
+    reason: str
+
+
+@dataclass(frozen=True)
+class DatasetScan:
+    """What was found below a folder, usable and not."""
+
+    sequences: tuple[TrackingSequence, ...]
+    broken: tuple[BrokenSequence, ...]
+
+
+def scan_dataset(root: Path) -> DatasetScan:
+    """
+    Return every sequence at or below `root`.
+
+    Parameters
+    ----------
+    root : Path
+        A sequence folder, a folder of sequences, or a folder of groups of sequences.
+
+    Returns
+    -------
+    DatasetScan
+        Usable sequences in the order of their names, and the broken ones with the reason.
+
+    Raises
+    ------
+    DatasetError
+        When there is no such folder, or nothing in it looks like a sequence.
+
+    """
+    if not root.is_dir():
+        raise DatasetError(f'{root} is not a folder; give the folder of a dataset')
+    found = list(_walk(root.resolve(), _MAX_DEPTH))
+    if not found:
+        raise DatasetError(
+            f'{root} holds no sequence; expected folders with groundtruth.txt, '
+            'groundtruth_rect.txt or IR_label.json beside frames or a video')
+    return DatasetScan(
+        sequences=tuple(item for item in found if isinstance(item, TrackingSequence)),
+        broken=tuple(item for item in found if isinstance(item, BrokenSequence)))
+
+
+def _walk(folder: Path, depth: int) -> Iterator[Union[TrackingSequence, BrokenSequence]]:
+    try:
+        sequence = _read(folder)
+    except (SequenceError, OSError) as error:
+        yield BrokenSequence(f'{folder.parent.name}/{folder.name}', str(error))
+        return
+    if sequence is not None:
+        yield sequence
+    elif depth > 0:
+        for child in sorted(path for path in folder.iterdir() if path.is_dir()):
+            yield from _walk(child, depth - 1)
+
+
+def _read(folder: Path) -> Union[TrackingSequence, None]:
+    for reader in READERS:
+        sequence = reader(folder)
+        if sequence is not None:
+            return sequence
+    if any(ImageFiles.in_folder(folder / name) for name in _FRAME_FOLDERS):
+        raise SequenceError('frames without ground truth')
+    return None

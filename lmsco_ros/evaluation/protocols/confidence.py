@@ -1,0 +1,117 @@
+# Copyright 2026 lmsco_ros contributors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""How far a tracker's own word can be trusted: its score, and when it says LOST."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+from scipy.stats import rankdata
+
+from lmsco_ros.evaluation.geometry import Array
+
+Flags = npt.NDArray[np.bool_]
+
+GOOD_OVERLAP = 0.5
+
+
+@dataclass(frozen=True)
+class LostFigures:
+    """
+    When LOST was declared in one sequence.
+
+    Attributes
+    ----------
+    delays : tuple of int or None
+        For each time the target left: frames until the first LOST, None when it was not
+        declared before the target came back or the sequence ended.
+    false_alarms : int
+        Times LOST was declared while the target was there and the box, one frame
+        before, overlapped it by more than `GOOD_OVERLAP`.
+    frames_present : int
+        Frames with the target in the image.
+    lost_while_present : int
+        Of these, frames in state LOST, whether justified or not.
+
+    """
+
+    delays: tuple[object, ...]
+    false_alarms: int
+    frames_present: int
+    lost_while_present: int
+
+
+def auroc(scores: Array, overlap: Array) -> float:
+    """
+    Return the chance that a good frame is scored above a bad one.
+
+    Parameters
+    ----------
+    scores : ndarray, shape (n,)
+        The tracker's score for each frame; NaN where it gave none.
+    overlap : ndarray, shape (n,)
+        Overlap for each frame; good is above 0.5. NaN where the target is absent.
+
+    Returns
+    -------
+    float
+        Area under the receiver operating characteristic in [0, 1], ties counted half;
+        NaN unless there are both good and bad frames.
+
+    """
+    known = np.isfinite(scores) & np.isfinite(overlap)
+    good = overlap[known] > GOOD_OVERLAP
+    positives, negatives = int(good.sum()), int((~good).sum())
+    if not positives or not negatives:
+        return float('nan')
+    ranks = rankdata(scores[known])
+    return float((ranks[good].sum() - positives * (positives + 1) / 2) / (positives * negatives))
+
+
+def lost_figures(lost: Flags, overlap: Array) -> LostFigures:
+    """
+    Return how fast and how falsely LOST was declared.
+
+    Parameters
+    ----------
+    lost : ndarray, shape (n,), bool
+        Whether the tracker was LOST after each frame.
+    overlap : ndarray, shape (n,)
+        Overlap for each frame; NaN where the target is absent.
+
+    """
+    absent = ~np.isfinite(overlap)
+    onsets = np.flatnonzero(lost[1:] & ~lost[:-1]) + 1
+    false = [frame for frame in onsets
+             if not absent[frame] and overlap[frame - 1] > GOOD_OVERLAP]
+    return LostFigures(
+        delays=tuple(_delay(lost[start:end]) for start, end in _absences(absent)),
+        false_alarms=len(false),
+        frames_present=int((~absent).sum()),
+        lost_while_present=int((lost & ~absent).sum()))
+
+
+def _absences(absent: Flags) -> list[tuple[int, int]]:
+    """Return (first frame, frame after the last) of each absence that began in sight."""
+    steps = np.diff(absent.astype(int), append=0)
+    starts = np.flatnonzero(steps[:-1] == 1) + 1
+    return [(int(start), int(start + np.argmin(np.append(absent[start:], False))))
+            for start in starts]
+
+
+def _delay(lost: Flags) -> object:
+    return int(np.argmax(lost)) if lost.any() else None

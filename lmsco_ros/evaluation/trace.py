@@ -1,0 +1,98 @@
+# Copyright 2026 lmsco_ros contributors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""What a tracker did on one sequence: the only thing that figures are made from."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, Mapping, Optional
+
+import numpy as np
+import numpy.typing as npt
+
+_DECIMALS = 4
+
+
+@dataclass(frozen=True, eq=False)
+class Trace:
+    """
+    Answers, starts and failures, and the time they took.
+
+    Attributes
+    ----------
+    boxes : ndarray, shape (n, 4)
+        Answer for each frame, the given box at a start; NaN where there is none.
+    scores : ndarray, shape (n,)
+        Score for each frame; NaN where there is none.
+    lost : ndarray, shape (n,), bool
+        Frames after which the tracker was LOST.
+    starts, failures : tuple of int
+        Frames at which it was started and, in the supervised protocol, failed.
+    updates : int
+        Number of updates that the times are for.
+    cpu_seconds, wall_seconds : float
+        Time in updates: of the process on all cores, and on the clock. NaN for the CPU
+        time of a tracker that runs in another process.
+    error : str or None
+        What a crash said; frames from there on have no answer in the one-pass protocol
+        and count as a failure in the supervised one.
+
+    """
+
+    boxes: npt.NDArray[np.float64]
+    scores: npt.NDArray[np.float64]
+    lost: npt.NDArray[np.bool_]
+    starts: tuple[int, ...]
+    failures: tuple[int, ...] = ()
+    updates: int = 0
+    cpu_seconds: float = 0.0
+    wall_seconds: float = 0.0
+    error: Optional[str] = None
+
+    @classmethod
+    def unanswered(cls, frames: int, error: str) -> Trace:
+        """Return the trace of a tracker that died before it gave any answer."""
+        return cls(boxes=np.full((frames, 4), np.nan), scores=np.full(frames, np.nan),
+                   lost=np.zeros(frames, dtype=bool), starts=(), error=error)
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the trace as plain lists and numbers, NaN as None."""
+        return {
+            'boxes': [_plain(row) for row in self.boxes],
+            'scores': _plain(self.scores),
+            'lost': np.flatnonzero(self.lost).tolist(),
+            'starts': list(self.starts),
+            'failures': list(self.failures),
+            'updates': self.updates,
+            'cpu_seconds': None if np.isnan(self.cpu_seconds) else self.cpu_seconds,
+            'wall_seconds': self.wall_seconds,
+            'error': self.error,
+        }
+
+    @classmethod
+    def from_json(cls, content: Mapping[str, Any]) -> Trace:
+        """Return the trace that `to_json` described."""
+        scores = np.array(content['scores'], dtype=float)
+        lost = np.zeros(len(scores), dtype=bool)
+        lost[content['lost']] = True
+        return cls(boxes=np.array(content['boxes'], dtype=float).reshape(-1, 4), scores=scores,
+                   lost=lost, starts=tuple(content['starts']),
+                   failures=tuple(content['failures']), updates=content['updates'],
+                   cpu_seconds=float(np.array(content['cpu_seconds'], dtype=float)),
+                   wall_seconds=content['wall_seconds'], error=content['error'])
+
+
+def _plain(values: npt.NDArray[np.float64]) -> list[Optional[float]]:
+    return [round(float(value), _DECIMALS) if np.isfinite(value) else None for value in values]

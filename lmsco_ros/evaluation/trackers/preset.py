@@ -1,0 +1,82 @@
+# Copyright 2026 lmsco_ros contributors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The trackers of this package: every preset of the configuration."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+import json
+
+import numpy.typing as npt
+
+from lmsco_ros.core import BoundingBox, LMSCOTracker, TrackerConfig
+from lmsco_ros.evaluation.trackers.code_version import core_version
+from lmsco_ros.evaluation.trackers.interface import Answer
+
+
+class PresetTracker:
+    """
+    `LMSCOTracker` behind the interface of the evaluation.
+
+    Parameters
+    ----------
+    config : TrackerConfig
+        Settings of the tracker.
+
+    """
+
+    in_process = True
+
+    def __init__(self, config: TrackerConfig) -> None:
+        """Build the tracker."""
+        self._tracker = LMSCOTracker(config)
+
+    def initialize(self, image: npt.NDArray, box: BoundingBox) -> None:
+        """Start on `box`."""
+        self._tracker.reset()
+        self._tracker.initialize(image, box)
+
+    def update(self, image: npt.NDArray) -> Answer:
+        """Track into `image`."""
+        result = self._tracker.update(image)
+        return Answer(result.box, result.score, result.state)
+
+    def close(self) -> None:
+        """Release nothing; all memory is Python's."""
+
+
+@dataclass(frozen=True)
+class PresetSpec:
+    """
+    A preset by its name.
+
+    Attributes
+    ----------
+    name : str
+        One of `TrackerConfig.preset_names()`.
+
+    """
+
+    name: str
+
+    @property
+    def identity(self) -> str:
+        """All settings of the preset and the version of the core."""
+        settings = TrackerConfig.preset(self.name).to_dict()
+        return f'{core_version()} {json.dumps(settings, sort_keys=True, default=str)}'
+
+    def build(self) -> PresetTracker:
+        """Return a tracker with the preset's settings."""
+        return PresetTracker(TrackerConfig.preset(self.name))

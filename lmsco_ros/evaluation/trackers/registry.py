@@ -1,0 +1,71 @@
+# Copyright 2026 lmsco_ros contributors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+From a name on the command line to a tracker.
+
+`hcs` (any preset), `csrt` (any of OpenCV's), `nanotrack:backbone.onnx,head.onnx`,
+`vit:net.onnx`, `trax:NAME=command line` and `python:module:callable`.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from lmsco_ros.core import TrackerConfig
+from lmsco_ros.evaluation.errors import TrackerError
+from lmsco_ros.evaluation.trackers.interface import TrackerSpec
+from lmsco_ros.evaluation.trackers.opencv_peer import OPENCV_NAMES, OpenCVSpec
+from lmsco_ros.evaluation.trackers.preset import PresetSpec
+from lmsco_ros.evaluation.trackers.python_peer import PythonSpec
+from lmsco_ros.evaluation.trackers.trax_peer import TraxSpec
+
+
+def available_names() -> tuple[str, ...]:
+    """Return all names that work here without further files: presets, then peers."""
+    peers = tuple(name for name in OPENCV_NAMES if OpenCVSpec(name).available)
+    return tuple(TrackerConfig.preset_names()) + peers
+
+
+def resolve(text: str) -> TrackerSpec:
+    """
+    Return the tracker that `text` names.
+
+    Parameters
+    ----------
+    text : str
+        A name as described above.
+
+    Raises
+    ------
+    TrackerError
+        When no tracker has that name.
+
+    """
+    kind, _, rest = text.partition(':')
+    if kind == 'trax' and '=' in rest:
+        return TraxSpec(*rest.split('=', 1))
+    if kind == 'python' and ':' in rest:
+        return PythonSpec(*rest.split(':', 1))
+    if kind in OPENCV_NAMES:
+        models = tuple(Path(name).expanduser().resolve() for name in rest.split(',') if name)
+        missing = [path for path in models if not path.is_file()]
+        if missing:
+            raise TrackerError(f'tracker {kind!r}: there is no model file {missing[0]}')
+        return OpenCVSpec(kind, models)
+    if text in TrackerConfig.preset_names():
+        return PresetSpec(text)
+    known = ', '.join((*TrackerConfig.preset_names(), *OPENCV_NAMES))
+    raise TrackerError(f'there is no tracker {text!r}; known are {known}, '
+                       'trax:NAME=COMMAND and python:MODULE:CALLABLE')

@@ -1,0 +1,148 @@
+# Copyright 2026 lmsco_ros contributors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Spawned processes that run one tracker over one sequence at a time.
+
+Each worker computes in a single thread, so that frames per second compare. A worker
+that dies takes only its own job with it: the job is reported and the next one gets
+a new worker, which `concurrent.futures` does not offer.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from dataclasses import dataclass
+import multiprocessing
+from multiprocessing.connection import Connection, wait
+import signal
+import sys
+from typing import Any, Iterator, Sequence, Union
+
+import cv2
+from threadpoolctl import threadpool_limits
+
+from lmsco_ros.evaluation.datasets import TrackingSequence
+from lmsco_ros.evaluation.errors import SequenceError, TrackerError
+from lmsco_ros.evaluation.execution import PROTOCOLS
+from lmsco_ros.evaluation.trace import Trace
+from lmsco_ros.evaluation.trackers import TrackerSpec
+
+
+@dataclass(frozen=True, eq=False)
+class Job:
+    """One tracker on one sequence under one protocol ('ope' or 'vot')."""
+
+    tracker: TrackerSpec
+    sequence: TrackingSequence
+    protocol: str
+
+
+@dataclass(frozen=True)
+class Unreadable:
+    """The sequence, not the tracker, was at fault; `reason` says how."""
+
+    reason: str
+
+
+Outcome = Union[Trace, Unreadable]
+
+
+def run_jobs(jobs: Sequence[Job], workers: int) -> Iterator[tuple[Job, Outcome]]:
+    """
+    Yield each job with its outcome, in the order in which they finish.
+
+    Parameters
+    ----------
+    jobs : sequence of Job
+        What to run; nothing is started without any.
+    workers : int
+        Number of processes.
+
+    """
+    pending, idle = deque(jobs), []
+    busy: dict[Any, tuple[_Worker, Job]] = {}
+    try:
+        while pending or busy:
+            while pending and len(busy) < workers:
+                worker, job = idle.pop() if idle else _Worker(), pending.popleft()
+                worker.connection.send(job)
+                busy[worker.connection] = worker, job
+            for connection in wait(list(busy)):
+                worker, job = busy.pop(connection)
+                try:
+                    outcome = worker.connection.recv()
+                    idle.append(worker)
+                except (EOFError, ConnectionError):
+                    outcome = Trace.unanswered(len(job.sequence), worker.obituary())
+                yield job, outcome
+    finally:
+        for worker in (*idle, *(worker for worker, _ in busy.values())):
+            worker.stop()
+
+
+class _Worker:
+    """A process and the connection to it."""
+
+    def __init__(self) -> None:
+        context = multiprocessing.get_context('spawn')
+        self.connection, theirs = context.Pipe()
+        self._process = context.Process(target=_serve, args=(theirs,), daemon=True)
+        self._process.start()
+        theirs.close()
+
+    def obituary(self) -> str:
+        """Return what is known of a process that died."""
+        self._process.join()
+        return f'the process died with exit code {self._process.exitcode}'
+
+    def stop(self) -> None:
+        """End the process whatever it does."""
+        self.connection.close()
+        self._process.terminate()
+        self._process.join()
+
+
+def _serve(connection: Connection) -> None:
+    """Answer jobs until the other side hangs up."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    try:
+        while True:
+            connection.send(_run(connection.recv()))
+    except (EOFError, ConnectionError):
+        pass
+
+
+def _run(job: Job) -> Outcome:
+    cv2.setRNGSeed(0)
+    try:
+        tracker = job.tracker.build()
+    except TrackerError as error:
+        return Trace.unanswered(len(job.sequence), str(error))
+    try:
+        with threadpool_limits(limits=1):
+            _one_thread()
+            return PROTOCOLS[job.protocol](tracker, job.sequence)
+    except SequenceError as error:
+        return Unreadable(str(error))
+    finally:
+        tracker.close()
+
+
+def _one_thread() -> None:
+    """Limit the libraries that keep a thread count of their own."""
+    cv2.setNumThreads(1)
+    torch = sys.modules.get('torch')
+    if torch is not None:
+        torch.set_num_threads(1)
