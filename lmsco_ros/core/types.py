@@ -80,6 +80,10 @@ class BoundingBox:
         """Return (x, y, width, height)."""
         return self.x, self.y, self.width, self.height
 
+    def scaled(self, factor: float) -> 'BoundingBox':
+        """Return the box enlarged by `factor` around its center."""
+        return BoundingBox.from_center(self.center, (factor * self.width, factor * self.height))
+
     def intersection(self, other: 'BoundingBox') -> float:
         """Return the common area with `other` in square pixels."""
         width = min(self.x + self.width, other.x + other.width) - max(self.x, other.x)

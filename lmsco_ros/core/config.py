@@ -1,0 +1,385 @@
+# Copyright 2026 lmsco_ros contributors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Configuration of the tracker: frozen, validated, with named presets."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Any
+
+from lmsco_ros.core.errors import ConfigError
+from lmsco_ros.core.validation import build, check_choice, check_range
+import yaml
+
+__all__ = ['ConfidenceConfig', 'FeatureConfig', 'IntensityConfig', 'LearningConfig',
+           'RuntimeConfig', 'SamplingConfig', 'ScaleConfig', 'TrackerConfig']
+
+
+@dataclass(frozen=True)
+class IntensityConfig:
+    """
+    From counts to the working range.
+
+    Attributes
+    ----------
+    low_percentile, high_percentile : float
+        Percentiles of the frame that become 0 and 1.
+    smoothing : float
+        Part of the way that the range follows a small change in one frame, in (0, 1].
+    jump : float
+        Change, as a part of the range, above which the range is adopted at once.
+    """
+
+    low_percentile: float = 1.0
+    high_percentile: float = 99.0
+    smoothing: float = 0.2
+    jump: float = 0.1
+
+    def __post_init__(self) -> None:
+        """Check the ranges."""
+        check_range(self, 'low_percentile', 0, 49)
+        check_range(self, 'high_percentile', 51, 100)
+        check_range(self, 'smoothing', 0, 1, open_low=True)
+        check_range(self, 'jump', 0, 1)
+
+
+@dataclass(frozen=True)
+class SamplingConfig:
+    """
+    The search region and its patch.
+
+    Attributes
+    ----------
+    search_factor : float
+        Side of the square search region over sqrt(target width * height).
+    patch_size_min, patch_size_max : int
+        Limits of the side of the patch, in pixels; the search region is resampled into them.
+    """
+
+    search_factor: float = 5.0
+    patch_size_min: int = 180
+    patch_size_max: int = 180
+
+    def __post_init__(self) -> None:
+        """Check the ranges."""
+        check_range(self, 'search_factor', 1.5, 10)
+        check_range(self, 'patch_size_min', 32, 1024)
+        check_range(self, 'patch_size_max', self.patch_size_min, 1024)
+
+
+@dataclass(frozen=True)
+class FeatureConfig:
+    """
+    One block of feature channels.
+
+    Attributes
+    ----------
+    kind : {'hog', 'intensity'}
+        What the channels are.
+    cell : int
+        Side of a cell in patch pixels.
+    weight : float
+        Factor on the normalized block.
+    """
+
+    kind: str
+    cell: int = 4
+    weight: float = 1.0
+
+    def __post_init__(self) -> None:
+        """Check the ranges."""
+        check_choice(self, 'kind', ('hog', 'intensity'))
+        check_range(self, 'cell', 1, 32)
+        check_range(self, 'weight', 0, 100, open_low=True)
+
+
+@dataclass(frozen=True)
+class LearningConfig:
+    """
+    Training of the structured correlation filter.
+
+    Attributes
+    ----------
+    anchor : {'unit', 'coupled', 'frozen'}
+        Reading of s(y0) in the margin; `frozen` is the literal (11)-(12) and diverges.
+    solve : {'joint', 'per_block'}
+        One problem for all blocks, or one for each.
+    core : float
+        Label above which the unit anchor's loss is two-sided; 0 is ridge regression.
+    margin_weight : float
+        C of the paper's (7).
+    label_sigma : float
+        Standard deviation of the label over sqrt(target width * height).
+    window_minimum, window_edge : float
+        Spatial window at the center of the target and in the middle of its sides.
+    window_sparsity : float
+        Window coefficients below this part of the largest are dropped.
+    memory_size : int
+        Training samples kept.
+    learning_rate : float
+        Of the prior weights of the samples.
+    initial_iterations : int
+        Outer iterations in the first frame.
+    iterations : int
+        Outer iterations of an update.
+    gradient_steps : int
+        Conjugate gradient steps in each outer iteration.
+    update_interval : int
+        Frames between two updates; every frame is stored.
+    """
+
+    anchor: str = 'unit'
+    solve: str = 'joint'
+    core: float = 0.5
+    margin_weight: float = 1.0
+    label_sigma: float = 1 / 12
+    window_minimum: float = 0.03
+    window_edge: float = 0.05
+    window_sparsity: float = 0.05
+    memory_size: int = 30
+    learning_rate: float = 0.01
+    initial_iterations: int = 30
+    iterations: int = 3
+    gradient_steps: int = 2
+    update_interval: int = 5
+
+    def __post_init__(self) -> None:
+        """Check the ranges."""
+        check_choice(self, 'anchor', ('unit', 'coupled', 'frozen'))
+        check_choice(self, 'solve', ('joint', 'per_block'))
+        check_range(self, 'core', 0, 1)
+        check_range(self, 'margin_weight', 0, 1e6, open_low=True)
+        check_range(self, 'label_sigma', 0, 1, open_low=True)
+        check_range(self, 'window_minimum', 0, 1e3, open_low=True)
+        check_range(self, 'window_edge', self.window_minimum, 1e3)
+        check_range(self, 'window_sparsity', 0, 1)
+        check_range(self, 'memory_size', 1, 1000)
+        check_range(self, 'learning_rate', 0, 0.5)
+        for name in ('initial_iterations', 'iterations', 'gradient_steps', 'update_interval'):
+            check_range(self, name, 1, 1000)
+
+
+@dataclass(frozen=True)
+class ScaleConfig:
+    """
+    How the size of the target is followed.
+
+    Attributes
+    ----------
+    estimator : {'filter', 'search', 'none'}
+        One-dimensional scale filter (DSST), search over scaled patches (the paper), or a
+        constant size.
+    step : float
+        Ratio of two neighboring scales.
+    exponent_min, exponent_max : int
+        Range of the exponents of `step`.
+    learning_rate : float
+        Of the scale filter.
+    model_area : float
+        Area of a scale sample in pixels.
+    padding : float
+        Side of a scale sample over that of the target.
+    regularization : float
+        Ridge term of the scale filter.
+    label_sigma : float
+        Standard deviation of its label, in scales.
+    """
+
+    estimator: str = 'filter'
+    step: float = 1.03
+    exponent_min: int = -8
+    exponent_max: int = 8
+    learning_rate: float = 0.025
+    model_area: float = 512.0
+    padding: float = 1.0
+    regularization: float = 0.01
+    label_sigma: float = 1.0
+
+    def __post_init__(self) -> None:
+        """Check the ranges."""
+        check_choice(self, 'estimator', ('filter', 'search', 'none'))
+        check_range(self, 'step', 1, 2, open_low=True)
+        check_range(self, 'exponent_min', -50, 0)
+        check_range(self, 'exponent_max', 0, 50)
+        check_range(self, 'learning_rate', 0, 1)
+        check_range(self, 'model_area', 64, 65536)
+        check_range(self, 'padding', 1, 4)
+        check_range(self, 'regularization', 0, 100, open_low=True)
+        check_range(self, 'label_sigma', 0, 50, open_low=True)
+
+
+@dataclass(frozen=True)
+class ConfidenceConfig:
+    """
+    When the target counts as lost and as found again.
+
+    Attributes
+    ----------
+    reference_frames : int
+        Frames after the start whose median sharpness is the measure of all later ones.
+    uncertain, lost : float
+        Sharpness, as a part of the reference, below which the state is UNCERTAIN, and below
+        which the frame is neither believed nor learned from.
+    lost_frames : int
+        Frames in a row below `lost` until the state is LOST.
+    found : float
+        Sharpness, as a part of the reference, from which a LOST target counts as found.
+    tiles : int
+        Other regions of the image that are searched per frame while the target is missing.
+    """
+
+    reference_frames: int = 10
+    uncertain: float = 0.3
+    lost: float = 0.15
+    lost_frames: int = 5
+    found: float = 0.4
+    tiles: int = 4
+
+    def __post_init__(self) -> None:
+        """Check the ranges."""
+        check_range(self, 'reference_frames', 1, 1000)
+        check_range(self, 'lost', 0, 1)
+        check_range(self, 'uncertain', self.lost, 1)
+        check_range(self, 'found', self.lost, 2)
+        check_range(self, 'lost_frames', 1, 1000)
+        check_range(self, 'tiles', 0, 64)
+
+
+@dataclass(frozen=True)
+class RuntimeConfig:
+    """
+    Where the tracker computes.
+
+    Attributes
+    ----------
+    device : str
+        'cpu', 'cuda' or 'cuda:N'.
+    threads : int
+        Threads of the numerical libraries in this process.
+    """
+
+    device: str = 'cpu'
+    threads: int = 1
+
+    def __post_init__(self) -> None:
+        """Check the ranges."""
+        check_range(self, 'threads', 1, 256)
+
+
+def _hcs_features() -> tuple[FeatureConfig, ...]:
+    """Return the handcrafted blocks."""
+    return (FeatureConfig('hog'), FeatureConfig('intensity'))
+
+
+@dataclass(frozen=True)
+class TrackerConfig:
+    """
+    Everything that decides how a target is tracked.
+
+    Attributes
+    ----------
+    features : tuple of FeatureConfig
+        Feature blocks.
+    intensity, sampling, learning, scale, confidence, runtime
+        Sections, described in their classes.
+    newton_steps : int
+        Refinement of the score's maximum.
+
+    Raises
+    ------
+    ConfigError
+        When a value is out of its range; says which and what was expected.
+    """
+
+    features: tuple[FeatureConfig, ...] = field(default_factory=_hcs_features)
+    intensity: IntensityConfig = IntensityConfig()
+    sampling: SamplingConfig = SamplingConfig()
+    learning: LearningConfig = LearningConfig()
+    scale: ScaleConfig = ScaleConfig()
+    confidence: ConfidenceConfig = ConfidenceConfig()
+    runtime: RuntimeConfig = RuntimeConfig()
+    newton_steps: int = 5
+
+    def __post_init__(self) -> None:
+        """Check the ranges."""
+        check_range(self, 'newton_steps', 0, 100)
+        if not self.features:
+            raise ConfigError('TrackerConfig.features is empty; name at least one block, '
+                              'for instance {kind: hog}')
+
+    @classmethod
+    def preset(cls, name: str) -> TrackerConfig:
+        """Return a named configuration; `preset_names` lists them."""
+        try:
+            return _PRESETS[name]
+        except KeyError:
+            raise ConfigError(f'unknown preset {name!r}; expected one of '
+                              f'{", ".join(_PRESETS)}') from None
+
+    @classmethod
+    def preset_names(cls) -> tuple[str, ...]:
+        """Return the names of all presets."""
+        return tuple(_PRESETS)
+
+    @classmethod
+    def from_dict(cls, data: Mapping[str, Any]) -> TrackerConfig:
+        """
+        Return a configuration from nested plain values.
+
+        The key `preset` names the configuration that the other keys change; without it they
+        change `default`. A list replaces the whole list.
+        """
+        data = dict(data)
+        base = asdict(cls.preset(data.pop('preset', 'default')))
+        return build(cls, _merge(base, data))
+
+    @classmethod
+    def from_yaml(cls, path: str | Path) -> TrackerConfig:
+        """Return the configuration in a YAML file, as `from_dict` reads it."""
+        try:
+            data = yaml.safe_load(Path(path).read_text(encoding='utf-8'))
+        except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
+            raise ConfigError(f'cannot read the configuration {path}: {error}; '
+                              'expected a readable YAML file') from error
+        if not isinstance(data or {}, Mapping):
+            raise ConfigError(f'{path} holds {type(data).__name__}; expected keys and values')
+        return cls.from_dict(data or {})
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return nested plain values that `from_dict` turns into the same configuration."""
+        data = asdict(self)
+        data['features'] = list(data['features'])
+        return data
+
+    def to_yaml(self, path: str | Path) -> None:
+        """Write the configuration to a YAML file."""
+        Path(path).write_text(yaml.safe_dump(self.to_dict(), sort_keys=False), encoding='utf-8')
+
+
+def _merge(base: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:
+    """Return `base` with `changes` laid over it, section by section."""
+    merged = dict(base)
+    for key, value in changes.items():
+        nested = isinstance(value, Mapping) and isinstance(merged.get(key), Mapping)
+        merged[key] = _merge(merged[key], value) if nested else value
+    return merged
+
+
+_PRESETS: Mapping[str, TrackerConfig] = {
+    'default': TrackerConfig(),
+    'hcs': TrackerConfig(),
+}

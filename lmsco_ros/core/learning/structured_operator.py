@@ -1,0 +1,114 @@
+# Copyright 2026 lmsco_ros contributors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The structured convolution operator: filters, their training samples, and their training."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from lmsco_ros.core.backend import Array, Backend
+from lmsco_ros.core.config import LearningConfig
+from lmsco_ros.core.fourier.series import bandwidth, grid_size
+from lmsco_ros.core.learning.collaborative import CollaborativeOptimizer
+from lmsco_ros.core.learning.margin import gaussian_label, make_margin_loss
+from lmsco_ros.core.learning.memory import SampleMemory, score
+from lmsco_ros.core.learning.regularization import SpatialWindow, window_series
+
+__all__ = ['StructuredOperator']
+
+
+class StructuredOperator:
+    """
+    Filters of all blocks, trained together or block by block.
+
+    Parameters
+    ----------
+    config : LearningConfig
+        Loss, window, memory and schedule.
+    sample : sequence of array, shape (2K_l + 1, K_l + 1, C_l)
+        Series of the first sample, the target at the origin.
+    target : tuple of float
+        (h, w) of the target in periods.
+    backend : Backend
+        Where the series live.
+    """
+
+    def __init__(self, config: LearningConfig, sample: Sequence[Array],
+                 target: tuple[float, float], backend: Backend) -> None:
+        self._config = config
+        everything = range(len(sample))
+        self._groups = [tuple(everything)] if config.solve == 'joint' else [
+            (block,) for block in everything]
+        self._memories = []
+        self._optimizers = []
+        for group in self._groups:
+            memory, optimizer = _make_group(config, [sample[i] for i in group], target, backend)
+            self._memories.append(memory)
+            self._optimizers.append(optimizer)
+        self._optimize(config.initial_iterations)
+
+    @property
+    def filters(self) -> list[Array]:
+        """Filter coefficients of every block, shape (2K_l + 1, K_l + 1, C_l)."""
+        return [block for optimizer in self._optimizers for block in optimizer.filters]
+
+    def scores(self, samples: Sequence[Array]) -> Array:
+        """
+        Return the scores of several samples.
+
+        Parameters
+        ----------
+        samples : sequence of array, shape (2K_l + 1, K_l + 1, n, C_l)
+            Series, n samples per block.
+
+        Returns
+        -------
+        array, shape (2K + 1, K + 1, n)
+            Series of the scores (paper, (5)).
+        """
+        return score(samples, self.filters)
+
+    def remember(self, sample: Sequence[Array]) -> None:
+        """Add a training sample, the target at the origin."""
+        for group, memory in zip(self._groups, self._memories, strict=True):
+            memory.add([sample[i] for i in group])
+
+    def train(self) -> None:
+        """Adapt the filters to the samples in memory."""
+        self._optimize(self._config.iterations)
+
+    def objective(self) -> float:
+        """Return the objective of the training problem at the current filters."""
+        return sum(optimizer.objective() for optimizer in self._optimizers)
+
+    def _optimize(self, iterations: int) -> None:
+        """Run the collaborative optimization of every group."""
+        for optimizer in self._optimizers:
+            optimizer.optimize(iterations, self._config.gradient_steps)
+
+
+def _make_group(config: LearningConfig, sample: Sequence[Array], target: tuple[float, float],
+                backend: Backend) -> tuple[SampleMemory, CollaborativeOptimizer]:
+    """Return memory and optimizer of blocks that are trained together."""
+    memory = SampleMemory(config.memory_size, config.learning_rate,
+                          [block.shape for block in sample], backend)
+    memory.add(sample)
+    side = (target[0] * target[1])**0.5
+    label = gaussian_label(grid_size(memory.order), (config.label_sigma * side,) * 2)
+    loss = make_margin_loss(config.anchor, label, config.core, backend)
+    series = window_series(target, config.window_minimum, config.window_edge,
+                           config.window_sparsity)
+    windows = [SpatialWindow(series, bandwidth(block), backend) for block in sample]
+    return memory, CollaborativeOptimizer(memory, loss, windows, config.margin_weight)

@@ -1,0 +1,203 @@
+# Copyright 2026 lmsco_ros contributors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Search region geometry and the patches taken from a frame."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+import math
+
+import cv2
+from lmsco_ros.core.config import SamplingConfig
+from lmsco_ros.core.errors import BoxError
+from lmsco_ros.core.intensity import IntensityRange, to_gray
+from lmsco_ros.core.types import BoundingBox
+import numpy as np
+
+__all__ = ['FrameView', 'check_box', 'clamp_box', 'patch_size', 'region_around', 'search_tiles']
+
+_SMALLEST_TARGET = 2.0
+_VISIBLE_PART = 0.25
+
+
+@dataclass(frozen=True)
+class FrameView:
+    """
+    One frame and the range its counts are seen in; pixels are converted only where sampled.
+
+    Attributes
+    ----------
+    image : ndarray, shape (H, W) or (H, W, 3)
+        The frame, not copied.
+    intensity : IntensityRange
+        Working range.
+    """
+
+    image: np.ndarray
+    intensity: IntensityRange
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """Width and height in pixels."""
+        return self.image.shape[1], self.image.shape[0]
+
+    def patch(self, region: BoundingBox, size: tuple[int, int]) -> np.ndarray:
+        """
+        Resample a region of the frame.
+
+        Parameters
+        ----------
+        region : BoundingBox
+            In image pixels; the border pixels are repeated outside of the image.
+        size : tuple of int
+            Width and height of the patch.
+
+        Returns
+        -------
+        ndarray, shape (height, width), float32
+            Intensities in the working range. A region with more pixels than the patch is
+            averaged, not skipped through.
+        """
+        step = (region.width / size[0], region.height / size[1])
+        factor = (max(1, int(step[0])), max(1, int(step[1])))
+        x0, x1 = _covering_span(region.x, region.width, self.size[0], factor[0])
+        y0, y1 = _covering_span(region.y, region.height, self.size[1], factor[1])
+        pixels = to_gray(self.image[y0:y1, x0:x1])
+        if factor != (1, 1):
+            pixels = _average(pixels, factor)
+        values = self.intensity.normalize(pixels.astype(np.float32, copy=False))
+        if self.image.dtype == np.float32:
+            values = np.nan_to_num(values, copy=False, nan=0.0, posinf=1.0, neginf=0.0)
+        start = ((region.x + step[0] / 2 - x0) / factor[0] - 0.5,
+                 (region.y + step[1] / 2 - y0) / factor[1] - 0.5)
+        inverse = np.array([[step[0] / factor[0], 0, start[0]], [0, step[1] / factor[1], start[1]]])
+        return cv2.warpAffine(values, inverse, size, flags=cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP,
+                              borderMode=cv2.BORDER_REPLICATE)
+
+
+def _covering_span(start: float, length: float, limit: int, factor: int) -> tuple[int, int]:
+    """Return the pixel span inside the image that a resampled interval reads from."""
+    margin = 2 * factor
+    first = min(max(math.floor(start) - margin, 0), limit - 1)
+    last = min(max(math.ceil(start + length) + margin, first + 1), limit)
+    return first, last
+
+
+def _average(pixels: np.ndarray, factor: tuple[int, int]) -> np.ndarray:
+    """Return the means over cells of `factor` pixels; incomplete cells count as they are."""
+    height, width = pixels.shape
+    pad = (-height % factor[1], -width % factor[0])
+    if any(pad):
+        pixels = cv2.copyMakeBorder(pixels, 0, pad[0], 0, pad[1], cv2.BORDER_REPLICATE)
+    size = (pixels.shape[1] // factor[0], pixels.shape[0] // factor[1])
+    return cv2.resize(pixels, size, interpolation=cv2.INTER_AREA)
+
+
+def region_around(box: BoundingBox, config: SamplingConfig) -> BoundingBox:
+    """Return the square search region around a target."""
+    side = config.search_factor * math.sqrt(box.area)
+    return BoundingBox.from_center(box.center, (side, side))
+
+
+def patch_size(size: tuple[float, float], config: SamplingConfig, cell: int) -> int:
+    """
+    Return the side of the patch in pixels.
+
+    Parameters
+    ----------
+    size : tuple of float
+        Target (width, height).
+    config : SamplingConfig
+        Limits of the patch.
+    cell : int
+        The side is a multiple of it; the number of cells is odd and a product of small primes,
+        on which Fourier transforms are fast.
+    """
+    side = config.search_factor * math.sqrt(size[0] * size[1])
+    wanted = min(max(side, config.patch_size_min), config.patch_size_max)
+    counts = [n for n in range(5, 2 + config.patch_size_max // cell) if _is_fast_odd(n)]
+    return cell * min(counts, key=lambda n: abs(n * cell - wanted))
+
+
+def _is_fast_odd(number: int) -> bool:
+    """Return whether `number` is odd and its prime factors are at most 11."""
+    if number % 2 == 0:
+        return False
+    for prime in (3, 5, 7, 11):
+        while number % prime == 0:
+            number //= prime
+    return number == 1
+
+
+def search_tiles(image_size: tuple[int, int], side: float,
+                 around: tuple[float, float]) -> list[tuple[float, float]]:
+    """
+    Return the centers of regions that together cover the image, nearest first.
+
+    Parameters
+    ----------
+    image_size : tuple of int
+        Width and height.
+    side : float
+        Side of a region; neighbors overlap by half of it.
+    around : tuple of float
+        Point (x, y) from which the search spreads.
+    """
+    axes = []
+    for length in image_size:
+        count = max(1, math.ceil(length / (side / 2)))
+        axes.append((np.arange(count) + 0.5) * length / count)
+    centers = [(float(x), float(y)) for y in axes[1] for x in axes[0]]
+    return sorted(centers, key=lambda c: math.dist(c, around))
+
+
+def check_box(box: BoundingBox, image_size: tuple[int, int]) -> None:
+    """
+    Raise BoxError unless a target in `box` can be learned.
+
+    Parameters
+    ----------
+    box : BoundingBox
+        Target; may reach over the border of the image.
+    image_size : tuple of int
+        Width and height.
+    """
+    if min(box.size) < _SMALLEST_TARGET:
+        raise BoxError(f'box {box.as_tuple()} is smaller than {_SMALLEST_TARGET:g} pixels; '
+                       'mark the target with some pixels in each direction')
+    image = BoundingBox(0, 0, *image_size)
+    if box.intersection(image) < _VISIBLE_PART * box.area:
+        raise BoxError(f'box {box.as_tuple()} has less than {_VISIBLE_PART:.0%} of its area in '
+                       f'the image of {image_size[0]} x {image_size[1]} pixels; '
+                       'mark the visible part of the target')
+
+
+def clamp_box(box: BoundingBox, image_size: tuple[int, int]) -> BoundingBox:
+    """
+    Return the box with its center in the image and a size that can be tracked.
+
+    Parameters
+    ----------
+    box : BoundingBox
+        Estimated target.
+    image_size : tuple of int
+        Width and height.
+    """
+    center = tuple(min(max(c, 0.0), float(length))
+                   for c, length in zip(box.center, image_size, strict=True))
+    grow = _SMALLEST_TARGET / min(box.size)
+    shrink = 2 * math.hypot(*image_size) / max(box.size)
+    return BoundingBox.from_center((center[0], center[1]), box.size).scaled(
+        min(max(1.0, grow), shrink))

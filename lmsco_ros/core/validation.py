@@ -1,0 +1,120 @@
+# Copyright 2026 lmsco_ros contributors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Checks and plain-data conversion of the frozen configuration dataclasses."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+import dataclasses
+import difflib
+import math
+import types
+import typing
+from typing import Any
+
+from lmsco_ros.core.errors import ConfigError
+
+__all__ = ['build', 'check_choice', 'check_range']
+
+
+def check_range(owner: object, name: str, low: float, high: float, *,
+                open_low: bool = False) -> None:
+    """
+    Raise ConfigError unless `low` <= owner.name <= `high` (`low` < with `open_low`).
+
+    Parameters
+    ----------
+    owner : object
+        Configuration section.
+    name : str
+        Its field.
+    low, high : float
+        Allowed range.
+    open_low : bool
+        Whether `low` itself is refused.
+    """
+    value = getattr(owner, name)
+    if not math.isfinite(value) or value > high or value < low or (open_low and value == low):
+        bracket = '(' if open_low else '['
+        raise ConfigError(f'{type(owner).__name__}.{name} is {value}; '
+                          f'expected a value in {bracket}{low}, {high}]')
+
+
+def check_choice(owner: object, name: str, choices: tuple[str, ...]) -> None:
+    """Raise ConfigError unless owner.name is one of `choices`."""
+    value = getattr(owner, name)
+    if value not in choices:
+        raise ConfigError(f'{type(owner).__name__}.{name} is {value!r}; '
+                          f'expected one of {", ".join(choices)}')
+
+
+def build(kind: type, data: Any, where: str = '') -> Any:
+    """
+    Build a configuration dataclass from nested mappings and lists.
+
+    Parameters
+    ----------
+    kind : type
+        Dataclass; fields may be numbers, strings, dataclasses, or tuples of these.
+    data : mapping
+        Values by field name; what is left out keeps its default.
+    where : str
+        Path of `data` in the file, for messages.
+
+    Raises
+    ------
+    ConfigError
+        On an unknown key (names the nearest known one) or a value of the wrong type.
+    """
+    if not isinstance(data, Mapping):
+        raise ConfigError(f'{where or "the configuration"} is {data!r}; expected keys and values: '
+                          f'{", ".join(f.name for f in dataclasses.fields(kind))}')
+    hints = typing.get_type_hints(kind)
+    known = [field.name for field in dataclasses.fields(kind)]
+    for key in data:
+        if key not in known:
+            near = difflib.get_close_matches(str(key), known, n=1, cutoff=0.0)
+            raise ConfigError(f'unknown key {_join(where, str(key))!r}; did you mean '
+                              f'{near[0]!r}? Known keys: {", ".join(known)}')
+    return kind(**{key: _convert(hints[key], value, _join(where, key))
+                   for key, value in data.items()})
+
+
+def _join(where: str, key: str) -> str:
+    """Return the path of a key."""
+    return f'{where}.{key}' if where else key
+
+
+def _convert(hint: Any, value: Any, where: str) -> Any:
+    """Return `value` as the type that the field declares."""
+    if dataclasses.is_dataclass(hint):
+        return build(typing.cast(type, hint), value, where)
+    if typing.get_origin(hint) is tuple:
+        if isinstance(value, str) or not isinstance(value, (list, tuple)):
+            raise ConfigError(f'{where} is {value!r}; expected a list')
+        item = typing.get_args(hint)[0]
+        return tuple(_convert(item, v, f'{where}[{i}]') for i, v in enumerate(value))
+    if typing.get_origin(hint) in (typing.Union, types.UnionType):
+        if value is None:
+            return None
+        hint = typing.get_args(hint)[0]
+    number = isinstance(value, (int, float)) and not isinstance(value, bool)
+    if hint is float and number:
+        return float(value)
+    if hint is int and number and float(value).is_integer():
+        return int(value)
+    if hint in (bool, str) and isinstance(value, hint):
+        return value
+    raise ConfigError(f'{where} is {value!r}; expected a {hint.__name__}')
