@@ -1,0 +1,126 @@
+# Copyright 2026 lmsco_ros contributors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""What the node says about every frame; pictures only when somebody listens."""
+
+from __future__ import annotations
+
+from diagnostic_msgs.msg import DiagnosticArray
+from geometry_msgs.msg import PolygonStamped
+from rclpy.lifecycle import LifecycleNode
+from rclpy.lifecycle.publisher import LifecyclePublisher
+from sensor_msgs.msg import Image
+from std_msgs.msg import Header
+from visualization_msgs.msg import ImageMarker
+
+from lmsco_ros.core.types import TrackResult, TrackState
+from lmsco_ros.node.diagnostics import frame_status
+from lmsco_ros.node.parameters import Settings
+from lmsco_ros.node.worker import Outcome
+from lmsco_ros.visualization.display_range import DisplayRange
+from lmsco_ros.visualization.overlay import draw_overlay, state_color
+from msg_adapters.boxes import detections_available, detections_from_box, polygon_from_box
+from msg_adapters.confidence import message_from_confidence
+from msg_adapters.image import message_from_image
+from msg_adapters.markers import marker_from_box, marker_removal
+from msg_adapters.status import FrameStatus, message_from_status
+
+_DEPTH = 10
+
+
+class Outputs:
+    """
+    Publishers of a configured node; silent until it is active.
+
+    Parameters
+    ----------
+    node : LifecycleNode
+        Owner of the publishers.
+    settings : Settings
+        How pictures are drawn; may be replaced while running.
+
+    """
+
+    def __init__(self, node: LifecycleNode, settings: Settings) -> None:
+        self.settings = settings
+        self._node = node
+        self._display_range = DisplayRange()
+        self._frames = 0
+        self._box = self._publisher(PolygonStamped, 'box')
+        self._status = self._publisher(DiagnosticArray, 'status')
+        self._confidence = self._publisher(Image, 'confidence_map')
+        self._overlay = self._publisher(Image, 'overlay')
+        self._marker = self._publisher(ImageMarker, 'marker')
+        self._detections = self._detections_publisher()
+
+    def publish(self, outcome: Outcome, dropped_frames: int) -> None:
+        """Say everything about one frame, what others wait for first."""
+        header, result = outcome.frame.context, outcome.result
+        found = result is not None and result.state is not TrackState.LOST
+        if found:
+            self._box.publish(polygon_from_box(result.box.as_tuple(), header))
+        self.publish_status(frame_status(outcome, dropped_frames), header)
+        if _is_heard(self._detections):
+            self._detections.publish(detections_from_box(
+                result.box.as_tuple() if found else None, track_id=str(outcome.track_id),
+                score=result.score if found else 0.0, header=header))
+        if _is_heard(self._marker):
+            self._marker.publish(self._outline(result, found, header))
+        if result is not None and _is_heard(self._confidence):
+            self._confidence.publish(message_from_confidence(
+                result.confidence_map, result.search_region.as_tuple(),
+                outcome.frame.image.shape[:2], header))
+        if _is_heard(self._overlay):
+            self._publish_overlay(outcome, header)
+
+    def publish_status(self, status: FrameStatus, header: Header) -> None:
+        """Say how things are with one frame."""
+        self._status.publish(message_from_status(status, self._node.get_name(), header))
+
+    def close(self) -> None:
+        """Take the topics away."""
+        for publisher in (self._box, self._status, self._confidence, self._overlay,
+                          self._marker, self._detections):
+            if publisher is not None:
+                self._node.destroy_lifecycle_publisher(publisher)
+
+    def _publisher(self, message_type: type, name: str) -> LifecyclePublisher:
+        return self._node.create_lifecycle_publisher(message_type, f'~/{name}', _DEPTH)
+
+    def _detections_publisher(self) -> LifecyclePublisher | None:
+        if not detections_available():
+            return None
+        from vision_msgs.msg import Detection2DArray
+        return self._publisher(Detection2DArray, 'detections')
+
+    def _outline(self, result: TrackResult | None, found: bool, header: Header) -> ImageMarker:
+        identity = {'namespace': self._node.get_name(), 'header': header}
+        if not found:
+            return marker_removal(**identity)
+        blue, green, red = (value / 255 for value in state_color(result.state))
+        return marker_from_box(result.box.as_tuple(), (red, green, blue), **identity,
+                               line_width=self.settings.marker_line_width)
+
+    def _publish_overlay(self, outcome: Outcome, header: Header) -> None:
+        self._frames += 1
+        if self._frames % self.settings.overlay_interval:
+            return
+        view = self._display_range.apply(outcome.frame.image)
+        picture = draw_overlay(view, outcome.result, label=self.settings.overlay_label)
+        self._overlay.publish(message_from_image(picture, encoding='bgr8', header=header))
+
+
+def _is_heard(publisher: LifecyclePublisher | None) -> bool:
+    return publisher is not None and publisher.get_subscription_count() > 0

@@ -1,0 +1,47 @@
+# Copyright 2026 lmsco_ros contributors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""From the node's parameters to a tracker."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from lmsco_ros.core import LMSCOTracker, TrackerConfig
+from lmsco_ros.node.parameters import Settings
+
+
+def tracker_config(settings: Settings) -> TrackerConfig:
+    """
+    Return the tracker configuration that the parameters describe.
+
+    Raises
+    ------
+    ConfigError
+        When the preset is unknown, or the file cannot be read or holds wrong values.
+
+    """
+    if settings.tracker_config:
+        config = TrackerConfig.from_yaml(settings.tracker_config)
+    else:
+        config = TrackerConfig.preset(settings.preset)
+    runtime = config.runtime
+    return replace(config, runtime=replace(
+        runtime, device=settings.device or runtime.device,
+        threads=settings.threads or runtime.threads))
+
+
+def make_tracker(settings: Settings) -> LMSCOTracker:
+    """Return a tracker as the parameters describe it; raises as :func:`tracker_config`."""
+    return LMSCOTracker(tracker_config(settings))
