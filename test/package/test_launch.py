@@ -1,0 +1,105 @@
+# Copyright 2026 lmsco_ros contributors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The launch file offers its arguments and hands them on to the one node."""
+
+import importlib.util
+from pathlib import Path
+import sys
+from types import ModuleType
+
+import pytest
+
+REPOSITORY = Path(__file__).resolve().parents[2]
+LAUNCH_FILE = REPOSITORY / 'launch' / 'tracker.launch.py'
+ARGUMENTS = {'params_file', 'image_topic', 'namespace', 'node_name', 'use_large_image_profile'}
+
+
+class Recorded:
+    """Stands for any launch class: remembers how it was made."""
+
+    def __init__(self, *positional, **named):
+        self.positional = positional
+        self.named = named
+
+
+def load():
+    """Import the launch file and return its description."""
+    spec = importlib.util.spec_from_file_location('tracker_launch', LAUNCH_FILE)
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module.generate_launch_description()
+
+
+@pytest.fixture
+def entities(monkeypatch):
+    """Return {class name: [recorded, ...]} with stand-ins for the launch packages."""
+    names = {
+        'launch': ['LaunchDescription'],
+        'launch.actions': ['DeclareLaunchArgument', 'SetEnvironmentVariable'],
+        'launch.conditions': ['IfCondition'],
+        'launch.substitutions': ['LaunchConfiguration'],
+        'launch_ros': [],
+        'launch_ros.actions': ['Node'],
+    }
+    for module_name, classes in names.items():
+        module = ModuleType(module_name)
+        for name in classes:
+            setattr(module, name, type(name, (Recorded,), {}))
+        monkeypatch.setitem(sys.modules, module_name, module)
+    found = {}
+    for entity in load().positional[0]:
+        found.setdefault(type(entity).__name__, []).append(entity)
+    return found
+
+
+def test_arguments_are_declared_with_descriptions(entities):
+    """`ros2 launch --show-args` explains each of them."""
+    declared = {item.positional[0]: item.named for item in entities['DeclareLaunchArgument']}
+    assert set(declared) == ARGUMENTS
+    assert all(item['description'] for item in declared.values())
+
+
+def test_default_files_exist(entities):
+    """Both files lie where the launch file looks, in the source tree as in the installation."""
+    declared = {item.positional[0]: item.named for item in entities['DeclareLaunchArgument']}
+    assert Path(declared['params_file']['default_value']).is_file()
+    (variable,) = entities['SetEnvironmentVariable']
+    assert variable.positional[0] == 'FASTRTPS_DEFAULT_PROFILES_FILE'
+    assert Path(variable.positional[1]).is_file()
+    assert variable.named['condition'].positional[0].positional == ('use_large_image_profile',)
+
+
+def test_node_takes_every_argument(entities):
+    """The executable of this package, with parameters, names and the image topic handed on."""
+    (node,) = entities['Node']
+    assert (node.named['package'], node.named['executable']) == ('lmsco_ros', 'tracker_node')
+    assert node.named['namespace'].positional == ('namespace',)
+    assert node.named['name'].positional == ('node_name',)
+    assert node.named['parameters'][0].positional == ('params_file',)
+    ((topic, replacement),) = node.named['remappings']
+    assert topic == 'image_raw' and replacement.positional == ('image_topic',)
+
+
+def test_profile_is_set_before_the_node_starts(monkeypatch, entities):
+    """Launch runs its entities in order, and the node inherits what was set before it."""
+    order = [type(entity).__name__ for entity in load().positional[0]]
+    assert order.index('SetEnvironmentVariable') < order.index('Node')
+
+
+def test_real_launch_accepts_the_description():
+    """Where ROS 2 is installed its own classes take the same description."""
+    pytest.importorskip('launch_ros', reason='launch comes with an installed ROS 2')
+    description = load()
+    assert {argument.name for argument in description.get_launch_arguments()} == ARGUMENTS
