@@ -37,10 +37,7 @@ def generate_launch_description() -> LaunchDescription:
             description='Thermal images to track in (sensor_msgs/Image)'),
         DeclareLaunchArgument(
             'namespace', default_value='',
-            description='Namespace of the node and of its relative topics'),
-        DeclareLaunchArgument(
-            'node_name', default_value='lmsco_tracker',
-            description='Name of the node; give each of several trackers its own'),
+            description='Namespace of the node and its topics; each of several trackers needs its own'),
         DeclareLaunchArgument(
             'use_large_image_profile', default_value='false',
             description='Give Fast DDS a 32 MiB shared-memory segment for large images'),
@@ -51,7 +48,7 @@ def generate_launch_description() -> LaunchDescription:
             package='lmsco_ros',
             executable='tracker_node',
             namespace=LaunchConfiguration('namespace'),
-            name=LaunchConfiguration('node_name'),
+            name='lmsco_tracker',
             parameters=[LaunchConfiguration('params_file')],
             remappings=[('image_raw', LaunchConfiguration('image_topic'))],
             output='screen',

@@ -23,7 +23,7 @@ import pytest
 
 REPOSITORY = Path(__file__).resolve().parents[2]
 LAUNCH_FILE = REPOSITORY / 'launch' / 'tracker.launch.py'
-ARGUMENTS = {'params_file', 'image_topic', 'namespace', 'node_name', 'use_large_image_profile'}
+ARGUMENTS = {'params_file', 'image_topic', 'namespace', 'use_large_image_profile'}
 
 
 class Recorded:
@@ -82,11 +82,11 @@ def test_default_files_exist(entities):
 
 
 def test_node_takes_every_argument(entities):
-    """The executable of this package, with parameters, names and the image topic handed on."""
+    """The executable of this package, with parameters, namespace and image topic handed on."""
     (node,) = entities['Node']
     assert (node.named['package'], node.named['executable']) == ('lmsco_ros', 'tracker_node')
     assert node.named['namespace'].positional == ('namespace',)
-    assert node.named['name'].positional == ('node_name',)
+    assert node.named['name'] == 'lmsco_tracker'
     assert node.named['parameters'][0].positional == ('params_file',)
     ((topic, replacement),) = node.named['remappings']
     assert topic == 'image_raw' and replacement.positional == ('image_topic',)
