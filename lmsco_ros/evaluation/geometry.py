@@ -80,7 +80,8 @@ def overlaps(ground_truth: Array, boxes: Array,
     common = np.prod(np.clip(high - low, 0, None), axis=1)
     union = np.prod(ground_truth[:, 2:], axis=1) + np.prod(boxes[:, 2:], axis=1) - common
     ratio = np.divide(common, union, out=np.zeros(len(common)), where=union > 0)
-    return np.where(is_absent(ground_truth), np.nan, ratio)
+    # Rounding lifts the overlap of equal boxes just above 1.
+    return np.where(is_absent(ground_truth), np.nan, np.minimum(ratio, 1))
 
 
 def center_offsets(ground_truth: Array, boxes: Array) -> Array:

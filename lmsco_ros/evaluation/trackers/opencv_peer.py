@@ -39,8 +39,8 @@ _CONTRIB_REMEDY = (
     'is not in this OpenCV; it needs the contrib build: pip install "lmsco_ros[peers]" '
     '(or: pip uninstall opencv-python-headless; pip install opencv-contrib-python-headless)')
 
-# Below this many pixels a side MOSSE's window function leaves nothing of the target.
-_MOSSE_SMALLEST_SIDE = 24.0
+# On smaller windows MOSSE's peak-to-sidelobe test leaves no side lobe, and it gives up at once.
+_MOSSE_SMALLEST_SIDE = 32.0
 
 
 @dataclass(frozen=True)
@@ -106,12 +106,17 @@ class OpenCVTracker:
             outer = BoundingBox(*map(float, region))
             size = outer.width * self._shrink[0], outer.height * self._shrink[1]
             self._last = BoundingBox.from_center(outer.center, size)
-        score = getattr(self._tracker, 'getTrackingScore', None)
-        return Answer(self._last, float(score()) if score else None,
+        return Answer(self._last, self._score(),
                       TrackState.TRACKING if found else TrackState.LOST)
 
     def close(self) -> None:
         """Release nothing; OpenCV counts references."""
+
+    def _score(self) -> Optional[float]:
+        """Return OpenCV's score, which is -1 for trackers that do not have one."""
+        ask = getattr(self._tracker, 'getTrackingScore', None)
+        score = float(ask()) if ask else -1.0
+        return score if score >= 0 else None
 
 
 @dataclass(frozen=True)

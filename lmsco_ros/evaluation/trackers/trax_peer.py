@@ -15,7 +15,7 @@
 """
 Any external tracker that speaks TraX, run as a process of its own.
 
-Needs the `trax` module (`pip install vot-trax`). Images travel in memory.
+Needs the `trax` module (`pip install "lmsco_ros[vot]"`). Images travel in memory.
 """
 
 from __future__ import annotations
@@ -68,7 +68,8 @@ class TraxTracker:
             stderr=subprocess.DEVNULL)
         streams = self._process.stdin.fileno(), self._process.stdout.fileno()
         try:
-            self._client = self._trax.client.Client(stream=streams)
+            # The library cannot be called without a log function.
+            self._client = self._trax.client.Client(stream=streams, log=lambda text: None)
             self._view = EightBitView(image)
             region = self._trax.region.Rectangle.create(*box.as_tuple())
             self._client.initialize(self._images(image), [(region, {})], {})
@@ -79,14 +80,14 @@ class TraxTracker:
     def update(self, image: npt.NDArray) -> Answer:
         """Send `image` and wait for the region."""
         try:
-            objects, _ = self._client.frame(self._images(image))
+            objects, _ = self._client.frame(self._images(image), {}, [])
         except self._trax.TraxException as error:
             raise TrackerError(f'TraX tracker {self._command!r} stopped: {error}') from error
         region, properties = objects[0]
         box = self._box(region)
-        word = properties.get('confidence')
-        return Answer(box, float(word) if word is not None else None,
-                      TrackState.TRACKING if box is not None else TrackState.LOST)
+        confidence = properties.get('confidence')
+        return Answer(box, float(confidence) if confidence is not None else None,
+                      _state(properties.get('state'), box))
 
     def close(self) -> None:
         """End the server, by force when it does not go by itself."""
@@ -152,10 +153,17 @@ class TraxSpec:
         return TraxTracker(self.command)
 
 
+def _state(word: Optional[str], box: Optional[BoundingBox]) -> TrackState:
+    """Return what the server says of its state, as ours does, or what the region tells."""
+    known = {state.value: state for state in TrackState}
+    return known.get(word, TrackState.LOST if box is None else TrackState.TRACKING)
+
+
 def _import_trax() -> Any:
     try:
         for module in ('trax.client', 'trax.image', 'trax.region'):
             importlib.import_module(module)
         return importlib.import_module('trax')
     except ImportError as error:
-        raise TrackerError('TraX trackers need the trax module: pip install vot-trax') from error
+        raise TrackerError('TraX trackers need the trax module: '
+                           'pip install "lmsco_ros[vot]"') from error

@@ -1,0 +1,105 @@
+# Copyright 2026 lmsco_ros contributors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Small datasets and a tracker of known behavior, for the tests of the evaluation."""
+
+import sys
+
+import cv2
+import numpy as np
+import pytest
+
+SIZE = (64, 48)
+
+# A tracker that is right until it is told otherwise by what the image shows: pixel
+# (0, 0) holds a command, the next four the true box.
+SCRIPTED = """
+import os
+import time
+
+from lmsco_ros.core import BoundingBox, TrackState
+from lmsco_ros.evaluation.trackers import Answer
+
+TRACK, MISS, LOSE, RAISE, DIE, REFUSE = range(6)
+
+
+class Scripted:
+    in_process = True
+
+    def initialize(self, image, box):
+        if image[0, 0] == REFUSE:
+            raise ValueError('refused to start')
+
+    def update(self, image):
+        command, x, y, width, height = image[0, :5].tolist()
+        if command == RAISE:
+            raise RuntimeError('stumbled')
+        if command == DIE:
+            os._exit(7)
+        if command == MISS:
+            x, y = 50, 40
+        state = TrackState.LOST if command == LOSE else TrackState.TRACKING
+        return Answer(BoundingBox(x, y, width, height), 0.25 if command == MISS else 0.75, state)
+
+    def close(self):
+        pass
+"""
+
+
+def render(box, command=0):
+    """Return an image that holds a command and the true box in its first pixels."""
+    image = np.full((SIZE[1], SIZE[0]), 90, np.uint8)
+    x, y, width, height = box
+    image[y:y + height, x:x + width] = 200
+    image[0, :5] = (command, *box)
+    return image
+
+
+def moving_boxes(frames):
+    """Return boxes that move right by one pixel a frame and stay in the image."""
+    return [(8 + index % 30, 12, 10, 8) for index in range(frames)]
+
+
+def write_vot(folder, commands, boxes=None):
+    """Write a VOT folder whose images carry `commands`, one a frame."""
+    boxes = boxes or moving_boxes(len(commands))
+    (folder / 'ir').mkdir(parents=True)
+    for index, (box, command) in enumerate(zip(boxes, commands)):
+        cv2.imwrite(str(folder / 'ir' / f'{index + 1:08d}.png'), render(box, command))
+    rows = [','.join(map(str, box)) for box in boxes]
+    (folder / 'groundtruth.txt').write_text('\n'.join(rows) + '\n', encoding='utf-8')
+    return folder
+
+
+@pytest.fixture
+def vot_folder():
+    """Return the function that writes a VOT folder."""
+    return write_vot
+
+
+@pytest.fixture
+def scripted(tmp_path, monkeypatch):
+    """Return the command-line name of the scripted tracker, importable in workers too."""
+    folder = tmp_path / 'modules'
+    folder.mkdir()
+    (folder / 'scripted_tracker.py').write_text(SCRIPTED, encoding='utf-8')
+    monkeypatch.syspath_prepend(folder)
+    monkeypatch.delitem(sys.modules, 'scripted_tracker', raising=False)
+    return 'python:scripted_tracker:Scripted'
+
+
+@pytest.fixture
+def thermal_dev(test_data):
+    """Return the folder of real sequences, or skip."""
+    return test_data / 'thermal_dev'

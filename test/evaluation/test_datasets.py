@@ -1,0 +1,187 @@
+# Copyright 2026 lmsco_ros contributors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Every folder layout is recognized, and broken sequences are named."""
+
+import json
+
+import cv2
+import numpy as np
+import pytest
+
+from lmsco_ros.evaluation.datasets import scan_dataset
+from lmsco_ros.evaluation.errors import DatasetError
+
+
+def images(folder, count, suffix='.png', color=False):
+    """Write `count` images whose level is their index."""
+    folder.mkdir(parents=True, exist_ok=True)
+    for index in range(count):
+        shape = (24, 32, 3) if color else (24, 32)
+        cv2.imwrite(str(folder / f'{index + 1:04d}{suffix}'), np.full(shape, index, np.uint8))
+
+
+def video(path, count):
+    """Write a gray video of `count` frames that get brighter."""
+    writer = cv2.VideoWriter(str(path), cv2.VideoWriter_fourcc(*'MJPG'), 25, (32, 24))
+    for index in range(count):
+        writer.write(np.full((24, 32, 3), 20 * index, np.uint8))
+    writer.release()
+
+
+def text(path, *rows):
+    """Write rows of text."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text('\n'.join(rows) + '\n', encoding='utf-8')
+
+
+def only(root):
+    """Return the one sequence below `root`."""
+    scan = scan_dataset(root)
+    assert not scan.broken
+    (sequence,) = scan.sequences
+    return sequence
+
+
+@pytest.mark.parametrize('channel', ['ir', 'color', '.'])
+def test_vot_folder_with_polygons_becomes_enclosing_boxes(tmp_path, channel):
+    images(tmp_path / 'seq' / channel, 2)
+    text(tmp_path / 'seq' / 'groundtruth.txt', '2,9,2,3,6,3,6,9', '1.5,2,3,4')
+    sequence = only(tmp_path)
+    assert sequence.ground_truth.tolist() == [[2, 3, 4, 6], [1.5, 2, 3, 4]]
+    assert sequence.full_name == f'{tmp_path.name}/seq'
+    assert [int(sequence.frames[index][0, 0]) for index in range(2)] == [0, 1]
+
+
+def test_vot_sequence_file_names_the_channel(tmp_path):
+    images(tmp_path / 'seq' / 'thermal', 2)
+    images(tmp_path / 'seq' / 'color', 3)
+    text(tmp_path / 'seq' / 'groundtruth.txt', '1,1,3,3', '1,1,3,3')
+    text(tmp_path / 'seq' / 'sequence', 'channels.color=color/%04d.png',
+         'channels.ir=thermal/%04d.png', 'channel.default=ir')
+    assert len(only(tmp_path).frames) == 2
+
+
+def test_vot_attributes_are_read_and_empty_is_what_has_none(tmp_path):
+    images(tmp_path / 'ir', 3)
+    text(tmp_path / 'groundtruth.txt', *['1,1,3,3'] * 3)
+    text(tmp_path / 'camera_motion.tag', '1', '0')
+    text(tmp_path / 'occlusion.label', '0', '0', '1')
+    attributes = only(tmp_path).attributes
+    assert attributes['camera_motion'].tolist() == [True, False, False]
+    assert attributes['occlusion'].tolist() == [False, False, True]
+    assert attributes['empty'].tolist() == [False, True, False]
+
+
+@pytest.mark.parametrize('row', ['5,6,3,4', '5\t6\t3\t4', '5 6 3 4'])
+def test_otb_boxes_start_at_one(tmp_path, row):
+    images(tmp_path / 'img', 1, '.jpg')
+    text(tmp_path / 'groundtruth_rect.txt', row)
+    assert only(tmp_path).ground_truth.tolist() == [[4, 5, 3, 4]]
+
+
+def test_anti_uav_json_with_frames_and_absent_targets(tmp_path):
+    images(tmp_path, 3)
+    content = {'exist': [1, 0, 1], 'gt_rect': [[1, 2, 3, 4], [], [0, 0, 0, 0]]}
+    text(tmp_path / 'IR_label.json', json.dumps(content))
+    truth = only(tmp_path).ground_truth
+    assert truth[0].tolist() == [1, 2, 3, 4]
+    assert np.isnan(truth[1:]).all()
+
+
+def test_anti_uav_json_with_video_ignores_the_visible_one(tmp_path):
+    video(tmp_path / 'infrared.avi', 3)
+    video(tmp_path / 'visible.avi', 5)
+    content = {'exist': [1] * 3, 'gt_rect': [[1, 2, 3, 4]] * 3}
+    text(tmp_path / 'infrared.json', json.dumps(content))
+    assert len(only(tmp_path).frames) == 3
+
+
+def test_video_and_text_with_nan_rows(tmp_path):
+    video(tmp_path / 'video.avi', 4)
+    text(tmp_path / 'groundtruth.txt', '1,2,3,4', 'nan,nan,nan,nan', '1,2,3,4', '1,2,0,0')
+    sequence = only(tmp_path)
+    assert np.isnan(sequence.ground_truth).all(axis=1).tolist() == [False, True, False, True]
+    forward = [sequence.frames[index].mean() for index in (0, 2, 3)]
+    assert forward == sorted(forward) and forward[0] < forward[2]
+    assert sequence.frames[2].mean() == forward[1]
+    assert sequence.frames[0].ndim == 2
+
+
+def test_real_color_stays_and_false_color_goes(tmp_path):
+    images(tmp_path / 'ir', 1, color=True)
+    text(tmp_path / 'groundtruth.txt', '1,1,3,3')
+    assert only(tmp_path).frames[0].shape == (24, 32)
+    colored = np.zeros((24, 32, 3), np.uint8)
+    colored[..., 2] = 100
+    cv2.imwrite(str(tmp_path / 'ir' / '0001.png'), colored)
+    assert only(tmp_path).frames[0].shape == (24, 32, 3)
+
+
+def test_sixteen_bit_images_keep_their_counts(tmp_path):
+    (tmp_path / 'ir').mkdir()
+    cv2.imwrite(str(tmp_path / 'ir' / '0001.png'), np.full((24, 32), 30_000, np.uint16))
+    text(tmp_path / 'groundtruth.txt', '1,1,3,3')
+    assert only(tmp_path).frames[0].max() == 30_000
+
+
+def test_groups_nest_and_broken_sequences_are_reported_with_reason(tmp_path):
+    images(tmp_path / 'a' / 'good' / 'ir', 2)
+    text(tmp_path / 'a' / 'good' / 'groundtruth.txt', '1,1,3,3', '1,1,3,3')
+    images(tmp_path / 'a' / 'short' / 'ir', 2)
+    text(tmp_path / 'a' / 'short' / 'groundtruth.txt', '1,1,3,3')
+    images(tmp_path / 'b' / 'words' / 'ir', 1)
+    text(tmp_path / 'b' / 'words' / 'groundtruth.txt', '1,1,x,3')
+    text(tmp_path / 'b' / 'blind' / 'groundtruth.txt', '1,1,3,3')
+    images(tmp_path / 'b' / 'untold' / 'ir', 1)
+    images(tmp_path / 'b' / 'nothing' / 'ir', 1)
+    text(tmp_path / 'b' / 'nothing' / 'groundtruth.txt', 'nan,nan,nan,nan')
+    (tmp_path / 'b' / 'garbled').mkdir()
+    (tmp_path / 'b' / 'garbled' / 'video.avi').write_bytes(b'no video')
+    text(tmp_path / 'b' / 'garbled' / 'groundtruth.txt', '1,1,3,3')
+    scan = scan_dataset(tmp_path)
+    assert [sequence.full_name for sequence in scan.sequences] == ['a/good']
+    reasons = {item.name: item.reason for item in scan.broken}
+    assert '2 frames but 1 rows' in reasons['a/short']
+    assert 'line 1' in reasons['b/words']
+    assert 'without frames' in reasons['b/blind']
+    assert 'without ground truth' in reasons['b/untold']
+    assert 'no frame has a ground-truth box' in reasons['b/nothing']
+    assert 'not a readable video' in reasons['b/garbled']
+
+
+def test_a_folder_without_sequences_is_refused(tmp_path):
+    with pytest.raises(DatasetError, match='holds no sequence'):
+        scan_dataset(tmp_path)
+    with pytest.raises(DatasetError, match='not a folder'):
+        scan_dataset(tmp_path / 'missing')
+
+
+def test_fingerprint_follows_frames_truth_and_length(tmp_path):
+    images(tmp_path / 'ir', 3)
+    text(tmp_path / 'groundtruth.txt', *['1,1,3,3'] * 3)
+    original = only(tmp_path)
+    assert only(tmp_path).fingerprint == original.fingerprint
+    assert len(original.first(2)) == 2
+    assert original.first(2).fingerprint != original.fingerprint
+    text(tmp_path / 'groundtruth.txt', '1,1,3,3', '1,1,3,3', '1,1,3,4')
+    assert only(tmp_path).fingerprint != original.fingerprint
+
+
+def test_real_sequences_are_all_understood(thermal_dev):
+    scan = scan_dataset(thermal_dev)
+    groups = {sequence.group for sequence in scan.sequences}
+    assert groups == {'anti_uav_ir', 'drone_ir', 'ptb_tir', 'vot_tir'}
+    assert {item.name.split('/')[0] for item in scan.broken} <= {'lepton_16bit'}
+    assert all(sequence.frames[0].ndim == 2 for sequence in scan.sequences[::20])

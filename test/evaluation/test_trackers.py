@@ -1,0 +1,127 @@
+# Copyright 2026 lmsco_ros contributors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Peers behind the one interface, and names that find them."""
+
+import cv2
+import numpy as np
+import pytest
+
+from lmsco_ros.core import BoundingBox, TrackerConfig
+from lmsco_ros.evaluation.errors import TrackerError
+from lmsco_ros.evaluation.trackers import available_names, resolve
+from lmsco_ros.evaluation.trackers.opencv_image import EightBitView
+from lmsco_ros.evaluation.trackers.opencv_peer import OPENCV_NAMES, OpenCVSpec, OpenCVTracker
+
+
+def scene(shift, dtype=np.uint8):
+    """Return a smooth texture with a warm patch, all moved right by `shift` pixels."""
+    generator = np.random.default_rng(3)
+    image = cv2.GaussianBlur(generator.uniform(0, 400, (120, 160)), (0, 0), 3)
+    image[40:60, 50:70] += cv2.GaussianBlur(generator.uniform(0, 200, (20, 20)), (0, 0), 2)
+    moved = np.roll(image - image.min(), shift, axis=1)
+    scaled = moved * 4 + 28_000 if dtype == np.uint16 else moved
+    return np.clip(scaled, 0, np.iinfo(dtype).max).astype(dtype)
+
+
+START = BoundingBox(50, 40, 20, 20)
+
+
+@pytest.mark.parametrize('name', [name for name in OPENCV_NAMES if OpenCVSpec(name).available])
+@pytest.mark.parametrize('dtype', [np.uint8, np.uint16])
+def test_peers_follow_gray_images_of_both_depths(name, dtype):
+    cv2.setRNGSeed(0)
+    tracker = resolve(name).build()
+    tracker.initialize(scene(0, dtype), START)
+    for shift in range(1, 21):
+        answer = tracker.update(scene(shift, dtype))
+    assert answer.box.overlap(BoundingBox(70, 40, 20, 20)) > 0.2
+    assert answer.score is None or 0 <= answer.score <= 1
+
+
+@pytest.mark.parametrize('name', [name for name in OPENCV_NAMES if OpenCVSpec(name).available])
+def test_peers_start_on_tiny_boxes_at_the_border(name):
+    tracker = resolve(name).build()
+    tracker.initialize(scene(0), BoundingBox(155.3, 110.2, 6, 5))
+    tracker.update(scene(1))
+
+
+class Recorded:
+    """Stand-in for an OpenCV tracker that answers with the box it was given."""
+
+    def init(self, image, box):
+        self.box = box
+
+    def update(self, image):
+        return True, self.box
+
+
+def test_padding_is_taken_off_again():
+    peer = OpenCVTracker(Recorded, smallest_side=24)
+    peer.initialize(scene(0), BoundingBox(50, 40, 8, 30))
+    box = peer.update(scene(0)).box
+    assert box.center == pytest.approx((54, 55), abs=0.5)
+    assert box.size == pytest.approx((8, 30), abs=0.5)
+
+
+def test_missing_contrib_build_is_named_with_its_remedy(monkeypatch):
+    monkeypatch.delattr(cv2, 'TrackerCSRT', raising=False)
+    assert 'csrt' not in available_names()
+    with pytest.raises(TrackerError, match='opencv-contrib-python-headless'):
+        resolve('csrt').build()
+
+
+def test_model_files_are_asked_for():
+    with pytest.raises(TrackerError, match='vit:net.onnx'):
+        resolve('vit').build()
+    with pytest.raises(TrackerError, match='no model file'):
+        resolve('vit:/nowhere/net.onnx')
+
+
+def test_every_preset_is_found_by_name():
+    for name in TrackerConfig.preset_names():
+        assert resolve(name).name == name
+        assert name in available_names()
+
+
+def test_identity_follows_settings(monkeypatch):
+    name, *others = TrackerConfig.preset_names()
+    assert resolve(name).identity == resolve(name).identity
+    assert resolve('mil').identity != resolve(name).identity
+
+
+def test_unknown_trackers_are_refused_with_the_known_ones():
+    with pytest.raises(TrackerError, match='csrt'):
+        resolve('cstr')
+    with pytest.raises(TrackerError, match='cannot be imported'):
+        resolve('python:no_such_module:Tracker').build()
+
+
+def test_preset_tracks_a_square():
+    tracker = resolve('hcs').build()
+    tracker.initialize(scene(0), START)
+    for shift in range(1, 7):
+        answer = tracker.update(scene(shift))
+    assert answer.box.overlap(BoundingBox(56, 40, 20, 20)) > 0.6
+    assert 0 <= answer.score <= 1
+
+
+def test_gain_is_that_of_the_first_image():
+    first = np.linspace(28_000, 28_600, 100).reshape(10, 10).astype(np.uint16)
+    view = EightBitView(first)
+    assert view(first).shape == (10, 10, 3)
+    assert view(first).min() == 0 and view(first).max() == 255
+    warmer = view(first + 300)
+    assert warmer.mean() > view(first).mean()
+    assert (EightBitView(np.full((4, 4), 7, np.uint8))(np.full((4, 4), 9, np.uint8)) == 9).all()
