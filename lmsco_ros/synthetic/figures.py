@@ -39,6 +39,7 @@ class Capsule:
         Half of the thickness, in pixels.
     heat : float
         Sensor counts of its surface.
+
     """
 
     x0: float
@@ -62,6 +63,7 @@ class Layer:
         Share of each pixel that the body covers.
     heat : ndarray, shape (h, w), float32
         Counts of the body there.
+
     """
 
     rows: slice
@@ -85,6 +87,7 @@ def walker(foot: tuple[float, float], height: float, phase: float,
         Phase of the step, in radians; arms and legs swing once in 2 pi.
     heat : float
         Counts of the clothes; bare skin is warmer.
+
     """
     x, ground = foot
     swing = math.sin(phase)

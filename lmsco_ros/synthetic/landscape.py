@@ -43,6 +43,7 @@ def render_landscape(width: int, height: int, clutter: int,
     Returns
     -------
     ndarray, shape (height, width), float32
+
     """
     rows = np.linspace(0, 1, height, dtype=np.float32)[:, None]
     columns = np.arange(width)

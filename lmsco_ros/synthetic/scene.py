@@ -62,6 +62,7 @@ class SceneConfig:
         Number of warm things that stand around.
     noise, pattern : float
         Standard deviation of the noise over time and of the fixed pattern, in counts.
+
     """
 
     width: int = 640
@@ -104,6 +105,7 @@ class SceneFrame:
         The target's extent, hidden parts included; it may exceed the frame.
     visible : float
         Share of the target's area that is neither hidden nor outside, in [0, 1].
+
     """
 
     index: int

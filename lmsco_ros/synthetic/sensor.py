@@ -37,6 +37,7 @@ class Sensor:
         Standard deviation of the fixed pattern (columns and single pixels), in counts.
     rng : numpy.random.Generator
         Source of the noise.
+
     """
 
     def __init__(self, shape: tuple[int, int], noise: float, pattern: float,

@@ -41,6 +41,7 @@ class DisplayRange:
     ----------
     rate : float
         Fraction of the way to the new frame's percentiles, in (0, 1]; 1 does not smooth.
+
     """
 
     def __init__(self, rate: float = 0.1) -> None:
@@ -67,6 +68,7 @@ class DisplayRange:
         ------
         ImageError
             When the image is empty or has another shape or type.
+
         """
         if image.size and image.dtype == np.uint8 and (
                 image.ndim == 2 or image.ndim == 3 and image.shape[2] == 3):

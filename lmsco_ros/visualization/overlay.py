@@ -61,6 +61,7 @@ def draw_overlay(image: npt.NDArray, result: TrackResult | None, *,
     -------
     ndarray, shape (H, W, 3), uint8 (BGR)
         Same size as the image.
+
     """
     view = DisplayRange().apply(image)
     canvas = view.copy() if view.ndim == 3 else cv2.cvtColor(view, cv2.COLOR_GRAY2BGR)
