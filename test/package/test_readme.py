@@ -1,0 +1,136 @@
+# Copyright 2026 lmsco_ros contributors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""What the README promises is there: interface, parameters, commands, links and examples."""
+
+from pathlib import Path
+import re
+
+import cv2
+import numpy as np
+import pytest
+import yaml
+
+REPOSITORY = Path(__file__).resolve().parents[2]
+README = (REPOSITORY / 'README.md').read_text()
+PICTURE_BYTES = 300_000
+
+
+def table(heading):
+    """Return the rows of the table below a heading, as lists of cells without back-ticks."""
+    section = README.split(f'\n## {heading}\n')[1].split('\n## ')[0]
+    rows = [line for line in section.splitlines() if line.startswith('|')][2:]
+    return [[cell.strip().strip('`') for cell in row.strip('|').split('|')] for row in rows]
+
+
+def blocks(language):
+    """Return the fenced code blocks of a language."""
+    return re.findall(rf'```{language}\n(.*?)```', README, re.S)
+
+
+def test_parameter_table_is_the_parameter_file():
+    """Names, order and defaults agree with config/tracker.yaml."""
+    (node,) = yaml.safe_load((REPOSITORY / 'config' / 'tracker.yaml').read_text()).values()
+    documented = {name: yaml.safe_load(default) for name, default, _ in table('Parameters')}
+    assert list(documented.items()) == list(node['ros__parameters'].items())
+
+
+@pytest.fixture(scope='module')
+def node():
+    """Run the real node in a context of its own."""
+    rclpy = pytest.importorskip('rclpy', reason='needs ROS 2')
+    from lmsco_ros.node.tracker_node import TrackerNode
+    context = rclpy.Context()
+    rclpy.init(context=context)
+    node = TrackerNode(context=context)
+    yield node
+    node.destroy_node()
+    rclpy.shutdown(context=context)
+
+
+def documented_names(node, rows):
+    """Return {full name: type} of table rows that begin with the name and end with a meaning."""
+    return {node.resolve_topic_name(row[0]): row[-2] for row in rows}
+
+
+def test_topic_table_is_the_interface_of_the_node(node):
+    """Every documented topic is offered with its type, and none is left out."""
+    own = (node.get_name(), node.get_namespace())
+    everybodys = {'/parameter_events', '/rosout', '/clock',
+                  f'/{node.get_name()}/transition_event'}
+    for direction, offered in [
+            ('in', node.get_subscriber_names_and_types_by_node(*own)),
+            ('out', node.get_publisher_names_and_types_by_node(*own))]:
+        offered = {name: types[0] for name, types in offered if name not in everybodys}
+        documented = documented_names(
+            node, [row for row in table('Topics') if row[1] == direction])
+        try:
+            import vision_msgs  # noqa: F401
+        except ImportError:
+            documented.pop('/lmsco_tracker/detections', None)
+        assert documented == offered
+
+
+def test_service_table_is_offered_by_the_node(node):
+    """Both services exist with the documented types."""
+    offered = node.get_service_names_and_types_by_node(node.get_name(), node.get_namespace())
+    documented = documented_names(node, table('Services'))
+    assert documented.items() <= {name: types[0] for name, types in offered}.items()
+
+
+def test_python_example_runs(tmp_path, monkeypatch, capsys):
+    """The block is executed on a small 16-bit scene with a warm target where it starts."""
+    (tmp_path / 'frames').mkdir()
+    noise = np.random.default_rng(0)
+    for number in range(4):
+        image = noise.normal(30_000, 20, (240, 320))
+        image[90:120, 120 + 2 * number:160 + 2 * number] += 400
+        cv2.imwrite(str(tmp_path / 'frames' / f'{number}.png'), image.astype(np.uint16))
+    monkeypatch.chdir(tmp_path)
+    (example,) = blocks('python')
+    exec(example, {})
+    assert len(capsys.readouterr().out.splitlines()) == 3
+
+
+def test_commands_of_the_command_line_exist():
+    """Each `lmsco` line names a command and only options that it has."""
+    from lmsco_ros.cli.main import app
+    import typer
+    commands = typer.main.get_command(app).commands
+    lines = re.findall(r'^lmsco (?!-)(\S+)(.*)$', '\n'.join(blocks('bash')), re.M)
+    assert len(lines) >= 4
+    for name, arguments in [*lines, ('demo', ''), ('evaluate', '')]:
+        options = {option for parameter in commands[name].params for option in parameter.opts}
+        assert set(re.findall(r'--[\w-]+', arguments.split('#')[0])) <= options
+
+
+def test_make_targets_exist():
+    """Each `make ...` of the README and of CONTRIBUTING is a target."""
+    text = README + (REPOSITORY / 'CONTRIBUTING.md').read_text()
+    targets = set(re.findall(r'^([\w-]+):', (REPOSITORY / 'Makefile').read_text(), re.M))
+    mentioned = set(re.findall(r'(?:^|`|&& )make(?: -C \S+)? ([a-z]+)', text, re.M))
+    assert {'demo', 'test', 'lint', 'venv'} <= mentioned <= targets
+
+
+@pytest.mark.parametrize('page', ['README.md', 'CONTRIBUTING.md'])
+def test_links_lead_somewhere(page):
+    """Every relative link is a file of the repository."""
+    text = (REPOSITORY / page).read_text()
+    for target in re.findall(r'\]\(([^)#:]+)\)', text):
+        assert (REPOSITORY / target).exists(), f'{page} links to {target}'
+
+
+def test_picture_is_small_enough_to_load():
+    """It is shown to everybody who opens the page."""
+    assert (REPOSITORY / 'docs/images/demo.png').stat().st_size < PICTURE_BYTES
