@@ -87,7 +87,8 @@ def find_python(wanted=None):
 
 def provides_jazzy(python, environment):
     """Tell whether a sourced ROS 2 Jazzy gives this interpreter its rclpy."""
-    return environment.get('ROS_DISTRO') == 'jazzy' and answer(python, 'import rclpy') is not None
+    return (environment.get('ROS_DISTRO') == 'jazzy'
+            and answer(python, 'from rclpy.node import Node') is not None)
 
 
 def check_platform(system, machine):

@@ -31,7 +31,7 @@ FAKE_PYTHON = """\
 case "$*" in
   *version_info*) echo {version} ;;
   *'import ensurepip'*) exit {ensurepip} ;;
-  *'import rclpy'*) exit {rclpy} ;;
+  *'from rclpy'*) exit {rclpy} ;;
   *'-m venv'*) echo "$*" >> {log}
     for venv; do :; done
     mkdir -p "$venv/bin"; cp "$0" "$venv/bin/python" ;;
