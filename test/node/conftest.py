@@ -94,7 +94,7 @@ class Graph:
         """Start the node under test with the fake tracker unless another is given."""
         factory = values.pop('tracker_factory', lambda settings: self.fake)
         node = TrackerNode(
-            context=self.context, tracker_factory=factory,
+            context=self.context, tracker_factory=factory, cli_args=values.pop('cli_args', None),
             parameter_overrides=[Parameter(name, value=value) for name, value in values.items()])
         self.executor.add_node(node)
         self.trackers.append(node)

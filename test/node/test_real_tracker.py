@@ -1,0 +1,70 @@
+# Copyright 2026 lmsco_ros contributors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""The node with the tracker that it is made for."""
+
+import numpy as np
+import pytest
+
+from lmsco_ros.node.tracker_factory import make_tracker
+
+SHAPE = (96, 128)
+
+
+def _scene(number: int) -> np.ndarray:
+    """Return 16-bit counts with a warm blob that moves by (2, 1) pixels a frame."""
+    rows, columns = np.mgrid[:SHAPE[0], :SHAPE[1]]
+    x, y = 40 + 2 * number, 40 + number
+    texture = 40 * np.sin(rows / 5) * np.cos(columns / 7)
+    blob = 900 * np.exp(-((columns - x) ** 2 + (rows - y) ** 2) / 50)
+    return (8000 + texture + blob).astype(np.uint16)
+
+
+def _image(graph, number):
+    message = graph.image(shape=SHAPE)
+    np.frombuffer(message.data, np.uint16).reshape(SHAPE)[:] = _scene(number)
+    return message
+
+
+def test_warm_target_is_followed(run):
+    running = run(tracker_factory=make_tracker, preset='default')
+    running.start(30, 30, 20, 20)
+    for number in range(15):
+        assert running.send(_image(running.graph, number)).state == 'tracking'
+        x, y, width, height = running.last_box
+        assert x + width / 2 == pytest.approx(40.5 + 2 * number, abs=2)
+        assert y + height / 2 == pytest.approx(40.5 + number, abs=2)
+
+
+def test_box_outside_the_image_is_reported(run):
+    running = run(tracker_factory=make_tracker)
+    running.start(5000, 5000, 20, 20)
+    status = running.send(_image(running.graph, 0))
+    assert status.state == 'failed' and 'BoxError' in status.message
+    assert not running.boxes
+    running.start(30, 30, 20, 20)
+    assert running.send(_image(running.graph, 1)).state == 'tracking'
+
+
+def test_other_image_size_is_reported_and_the_next_start_tracks(run):
+    running = run(tracker_factory=make_tracker)
+    running.start(30, 30, 20, 20)
+    running.send(_image(running.graph, 0))
+    small = running.graph.image(80, shape=(60, 80), dtype=np.uint8)
+    status = running.send(small)
+    assert status.state == 'failed' and '(60, 80)' in status.message
+    assert running.send(_image(running.graph, 1)).state == 'idle'
+    running.start(32, 31, 20, 20)
+    assert running.send(_image(running.graph, 2)).state == 'tracking'
