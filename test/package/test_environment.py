@@ -17,6 +17,8 @@
 import importlib.util
 import os
 from pathlib import Path
+import subprocess
+import sys
 
 from hypothesis import given, settings, strategies as st
 import pytest
@@ -60,3 +62,18 @@ def test_runs_spread_over_the_domains(conftest):
 def test_properties_are_not_timed():
     """A loaded machine must not fail a property test."""
     assert settings().deadline is None
+
+
+def test_launch_plugins_of_ros_do_not_break_the_run(tmp_path):
+    """The plug-in of an installed ROS 2 asks for an argument that pytest 9 no longer gives."""
+    (tmp_path / 'old_plugin.py').write_text('def pytest_pycollect_makemodule(path, parent): ...\n')
+    for name in ('launch_testing', 'launch_ros'):
+        information = tmp_path / f'{name}-1.0.dist-info'
+        information.mkdir()
+        (information / 'METADATA').write_text(f'Name: {name}\nVersion: 1.0\n')
+        (information / 'entry_points.txt').write_text(f'[pytest11]\n{name} = old_plugin\n')
+    path = os.pathsep.join(filter(None, [str(tmp_path), os.environ.get('PYTHONPATH')]))
+    done = subprocess.run(
+        [sys.executable, '-m', 'pytest', '--collect-only', '-q', __file__],
+        env={**os.environ, 'PYTHONPATH': path}, capture_output=True, text=True)
+    assert done.returncode == 0, done.stdout + done.stderr
