@@ -19,6 +19,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+import struct
 from typing import Any
 
 from rosbags.highlevel import AnyReader, AnyReaderError
@@ -107,6 +108,13 @@ def choose_connection(reader: AnyReader, path: Path, topic: str) -> Connection:
 def header_stamp(message: Any) -> int:
     """Return the stamp of a message's header, in nanoseconds."""
     return message.header.stamp.sec * 1_000_000_000 + message.header.stamp.nanosec
+
+
+def serialized_stamp(data: bytes) -> int:
+    """Return the header stamp, in nanoseconds, of a serialized message that has one."""
+    order = '<' if data[1] & 1 else '>'
+    seconds, nanoseconds = struct.unpack_from(f'{order}iI', data, 4)
+    return seconds * 1_000_000_000 + nanoseconds
 
 
 class BagImages:

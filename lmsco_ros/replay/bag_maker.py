@@ -18,7 +18,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
-from enum import Enum
 from pathlib import Path
 import sys
 
@@ -31,16 +30,10 @@ from rosbags.typesys.store import Typestore
 from lmsco_ros.replay.bag_images import RAW
 from lmsco_ros.replay.errors import OutputError
 from lmsco_ros.replay.frame import Frame
+from lmsco_ros.replay.storage import Storage
 
 _ENCODINGS = {(np.dtype(np.uint8), 2): 'mono8', (np.dtype(np.uint16), 2): 'mono16',
               (np.dtype(np.float32), 2): '32FC1', (np.dtype(np.uint8), 3): 'bgr8'}
-
-
-class Storage(str, Enum):
-    """File format of a bag."""
-
-    MCAP = 'mcap'
-    SQLITE3 = 'sqlite3'
 
 
 @contextmanager

@@ -1,0 +1,40 @@
+# Copyright 2026 lmsco_ros contributors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""`lmsco`: track recordings, try the node, evaluate."""
+
+from __future__ import annotations
+
+import typer
+
+from lmsco_ros.cli import demo, evaluate, make_bag, replay, track
+
+
+def build_app() -> typer.Typer:
+    """Return the application with all its commands."""
+    app = typer.Typer(
+        name='lmsco', no_args_is_help=True, add_completion=False,
+        pretty_exceptions_enable=False, help='Follow targets in thermal video.')
+    for command in (track, replay, make_bag, demo, evaluate):
+        command.register(app)
+    return app
+
+
+def main() -> None:
+    """Run the command line and leave with its exit code: 0 ok, 1 failed, 2 misused."""
+    build_app()()
+
+
+if __name__ == '__main__':
+    main()

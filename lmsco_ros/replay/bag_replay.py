@@ -1,0 +1,227 @@
+# Copyright 2026 lmsco_ros contributors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""A bag through the real node, and its answers beside the original messages."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from itertools import islice
+from pathlib import Path
+import time
+
+from rosbags.highlevel import AnyReader
+from rosbags.interfaces import Connection
+from rosbags.rosbag2 import Writer
+from rosbags.typesys import get_typestore, Stores
+
+from lmsco_ros.core.types import BoundingBox
+from lmsco_ros.replay.bag_images import (
+    choose_connection, COMPRESSED, open_bag, serialized_stamp)
+from lmsco_ros.replay.bag_maker import create_bag
+from lmsco_ros.replay.errors import SourceError
+from lmsco_ros.replay.node_session import Heard, NODE_NAME, NodeSession, OUTPUTS
+from lmsco_ros.replay.player import Exchange, Player
+from lmsco_ros.replay.storage import Storage
+
+# While the node tracks one frame, the next one is on its way.
+_IN_FLIGHT = 2
+_LINGER_SECONDS = 0.3
+
+
+@dataclass(frozen=True)
+class ReplayPlan:
+    """
+    What is to be played and how.
+
+    Attributes
+    ----------
+    bag, output : Path
+        Recording, and the new bag.
+    storage : Storage
+        File format of the new bag.
+    box : BoundingBox
+        Target in the first image.
+    topic : str
+        Image topic; empty when there is only one.
+    rate : float
+        Speed relative to the recording; 0 is as fast as the node takes every frame.
+    frames : int or None
+        Only so many images.
+    parameters : mapping
+        Of the node.
+    outputs : tuple of str
+        What to record of the node besides box and status.
+
+    """
+
+    bag: Path
+    output: Path
+    storage: Storage
+    box: BoundingBox
+    topic: str
+    rate: float
+    frames: int | None
+    parameters: Mapping[str, object]
+    outputs: tuple[str, ...]
+
+
+def replay_bag(plan: ReplayPlan, on_begin: Callable[[int], None],
+               on_frame: Callable[[], None]) -> list[Exchange]:
+    """
+    Play a bag through the node and record the answers beside the original messages.
+
+    Parameters
+    ----------
+    plan : ReplayPlan
+        What to play.
+    on_begin : callable
+        Called once with the number of images.
+    on_frame : callable
+        Called for each image that was sent.
+
+    Returns
+    -------
+    list of Exchange
+        One for each image.
+
+    Raises
+    ------
+    ReplayError
+        When the bag cannot be read or written, or the node refuses.
+
+    """
+    with open_bag(plan.bag) as reader:
+        images = choose_connection(reader, plan.bag, plan.topic)
+        if not images.msgcount:
+            raise SourceError(f'{plan.bag} has no message on {images.topic}')
+        parameters = {'image_reliability': 'reliable', **plan.parameters,
+                      'frame_policy': 'latest' if plan.rate else 'all'}
+        with NodeSession(parameters, outputs=plan.outputs,
+                         compressed=images.msgtype == COMPRESSED) as session, \
+                create_bag(plan.output, plan.storage) as writer:
+            on_begin(min(images.msgcount, plan.frames or images.msgcount))
+            recorder = _Recorder(writer, reader, session_outputs(plan.outputs))
+            player = Player(session, recorder.on_heard)
+            recorder.sent_at = player.sent_at
+            _play(plan, reader, images, player, recorder, on_frame)
+    return player.exchanges()
+
+
+def session_outputs(extra: tuple[str, ...]) -> tuple[str, ...]:
+    """Return the names of everything that is recorded."""
+    return tuple(dict.fromkeys(('box', 'status', *extra)))
+
+
+def _play(plan: ReplayPlan, reader: AnyReader, images: Connection, player: Player,
+          recorder: _Recorder, on_frame: Callable[[], None]) -> None:
+    """Send the images at their pace and copy everything else."""
+    pace = _Pace(plan.rate)
+    last = _last_moment(reader, images, plan.frames)
+    sent = 0
+    for connection, logged, data in reader.messages(stop=last + 1):
+        if connection.topic == images.topic:
+            stamp = serialized_stamp(data)
+            if plan.rate:
+                player.listen_until(pace.moment(logged))
+            else:
+                player.settle(_IN_FLIGHT - 1 if sent > 1 else 0)
+            if not sent:
+                player.start(plan.box, stamp)
+            recorder.logged[stamp] = logged
+            player.send(stamp, data)
+            sent += 1
+            on_frame()
+        recorder.copy(connection, logged, data)
+    if plan.rate:
+        player.finish()
+    else:
+        player.settle(0)
+    # Pictures of the last frame come after its box.
+    player.listen_until(time.monotonic() + _LINGER_SECONDS)
+
+
+def _last_moment(reader: AnyReader, images: Connection, frames: int | None) -> int:
+    """Return when the last wanted image was recorded, or the bag ends."""
+    if frames is None or frames >= images.msgcount:
+        return reader.end_time
+    *_, last = islice((logged for _, logged, _ in reader.messages([images])), frames)
+    return last
+
+
+class _Pace:
+    """Moments of the present for moments of the recording."""
+
+    def __init__(self, rate: float) -> None:
+        self._rate = rate
+        self._first: tuple[int, float] | None = None
+
+    def moment(self, logged: int) -> float:
+        """Return when to play what was recorded at `logged`, in nanoseconds."""
+        if self._first is None:
+            self._first = (logged, time.monotonic())
+        return self._first[1] + (logged - self._first[0]) * 1e-9 / self._rate
+
+
+class _Recorder:
+    """
+    Writes the new bag.
+
+    Answers get the time of their image plus the time that the node took, so that both
+    stay side by side whatever the speed of the replay was.
+    """
+
+    def __init__(self, writer: Writer, reader: AnyReader, outputs: tuple[str, ...]) -> None:
+        self.logged: dict[int, int] = {}
+        self.sent_at: Callable[[int], float | None] = lambda stamp: None
+        self._writer = writer
+        store = get_typestore(Stores.ROS2_JAZZY)
+        topics = {output: f'/{NODE_NAME}/{output}' for output in outputs}
+        self._answers = {
+            output: writer.add_connection(topic, _type_name(OUTPUTS[output]), typestore=store)
+            for output, topic in topics.items()}
+        # Answers of an earlier replay make room for ours.
+        self._copies = {
+            connection.id: _copy_connection(writer, reader, connection)
+            for connection in reader.connections if connection.topic not in topics.values()}
+
+    def copy(self, connection: Connection, logged: int, data: bytes) -> None:
+        """Write an original message."""
+        if connection.id in self._copies:
+            self._writer.write(self._copies[connection.id], logged, data)
+
+    def on_heard(self, heard: Heard) -> None:
+        """Write a message of the node, if it is about one of the images."""
+        stamp = serialized_stamp(heard.data)
+        sent = self.sent_at(stamp)
+        if sent is not None:
+            moment = self.logged[stamp] + round(1e9 * (heard.received - sent))
+            self._writer.write(self._answers[heard.output], moment, heard.data)
+
+
+def _type_name(message_type: type) -> str:
+    """Return the name of a message class, such as std_msgs/msg/Header."""
+    return f'{message_type.__module__.split(".")[0]}/msg/{message_type.__name__}'
+
+
+def _copy_connection(writer: Writer, reader: AnyReader, connection: Connection) -> Connection:
+    """Add a topic as it was: type definition, quality of service and all."""
+    definition = {'msgdef': connection.msgdef.data, 'rihs01': connection.digest}
+    if not all(definition.values()):
+        definition = {'typestore': reader.typestore}
+    return writer.add_connection(
+        connection.topic, connection.msgtype, **definition,
+        serialization_format=connection.ext.serialization_format,
+        offered_qos_profiles=connection.ext.offered_qos_profiles)

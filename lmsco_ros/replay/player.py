@@ -1,0 +1,149 @@
+# Copyright 2026 lmsco_ros contributors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Frames to the node at a pace, answers back."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+import time
+
+from sensor_msgs.msg import CompressedImage, Image
+from std_msgs.msg import Header
+
+from lmsco_ros.core.types import BoundingBox
+from lmsco_ros.replay.answers import Answer, Answers
+from lmsco_ros.replay.errors import NodeError
+from lmsco_ros.replay.node_session import Heard, NodeSession
+
+_PATIENCE_SECONDS = 60.0
+
+
+@dataclass(frozen=True)
+class Exchange:
+    """
+    One frame and what the node said about it.
+
+    Attributes
+    ----------
+    stamp : int
+        Of the frame, in nanoseconds.
+    answer : Answer
+        Complete, or as far as it came.
+    latency : float or None
+        Seconds from sending the image to the box (the status, without one); None for a
+        frame that the node dropped.
+
+    """
+
+    stamp: int
+    answer: Answer
+    latency: float | None
+
+
+class Player:
+    """
+    Feeds a session and keeps account of the answers.
+
+    Parameters
+    ----------
+    session : NodeSession
+        The running node.
+    on_heard : callable
+        Called with every message of the node.
+
+    """
+
+    def __init__(self, session: NodeSession,
+                 on_heard: Callable[[Heard], None] = lambda heard: None) -> None:
+        self._session = session
+        self._on_heard = on_heard
+        self._answers = Answers()
+        self._sent: dict[int, float] = {}
+        self._pending: list[int] = []
+
+    def start(self, box: BoundingBox, stamp: int) -> None:
+        """Ask the node to start on `box` in the frame with `stamp`, which may follow."""
+        header = Header()
+        header.stamp.sec, header.stamp.nanosec = divmod(stamp, 1_000_000_000)
+        self._session.publish_start(box, header)
+
+    def send(self, stamp: int, message: Image | CompressedImage | bytes) -> None:
+        """Send the frame with `stamp`."""
+        self._sent[stamp] = time.monotonic()
+        self._pending.append(stamp)
+        self._session.publish_image(message)
+
+    def sent_at(self, stamp: int) -> float | None:
+        """Return when a frame was sent, on the clock of `time.monotonic`; None if never."""
+        return self._sent.get(stamp)
+
+    def listen_until(self, moment: float) -> None:
+        """
+        Take what the node says until a moment on the clock of `time.monotonic`.
+
+        Raises
+        ------
+        NodeError
+            When the node reports that it could not do what it was asked for.
+
+        """
+        while True:
+            heard = self._session.next_message(moment - time.monotonic())
+            if heard is None:
+                return
+            self._take(heard)
+
+    def settle(self, allowed: int) -> None:
+        """
+        Wait until at most `allowed` frames have no answer; no frame may be dropped.
+
+        Raises
+        ------
+        NodeError
+            When the node reports a failure, or does not answer for a minute.
+
+        """
+        self._wait(lambda: len(self._pending) <= allowed)
+
+    def finish(self) -> None:
+        """Wait for the answer to the last frame, which is never dropped; as `settle`."""
+        if self._pending:
+            last = self._pending[-1]
+            self._wait(lambda: last not in self._pending)
+
+    def exchanges(self) -> list[Exchange]:
+        """Return all frames in the order sent."""
+        return [self._exchange(stamp, sent) for stamp, sent in self._sent.items()]
+
+    def _wait(self, is_done: Callable[[], bool]) -> None:
+        while not is_done():
+            heard = self._session.next_message(_PATIENCE_SECONDS)
+            if heard is None:
+                raise NodeError(f'the node did not answer for {_PATIENCE_SECONDS:.0f} seconds; '
+                                'its log above may say why')
+            self._take(heard)
+
+    def _take(self, heard: Heard) -> None:
+        answer = self._answers.take(heard)
+        self._on_heard(heard)
+        if answer.failure:
+            raise NodeError(f'the node refuses: {answer.failure}')
+        if answer.is_tracked:
+            self._pending = [s for s in self._pending if not self._answers[s].is_tracked]
+
+    def _exchange(self, stamp: int, sent: float) -> Exchange:
+        answer = self._answers[stamp]
+        return Exchange(stamp, answer, answer.received - sent if answer.is_tracked else None)

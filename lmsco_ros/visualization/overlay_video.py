@@ -1,0 +1,126 @@
+# Copyright 2026 lmsco_ros contributors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The overlays as a film: `overlay.mp4`."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from types import TracebackType
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+
+from lmsco_ros.core.types import BoundingBox, TrackResult
+from lmsco_ros.visualization.display_range import DisplayRange
+from lmsco_ros.visualization.overlay import draw_box, draw_overlay
+
+# Below this height text hides much of the scene; small sensors are shown enlarged.
+_COMFORTABLE_HEIGHT = 360
+_TRUTH_COLOR = (235, 235, 235)
+
+
+class OverlayVideo:
+    """
+    Frames with their results, one after the other; use as a context manager.
+
+    Parameters
+    ----------
+    path : Path
+        The mp4 file.
+    fps : float
+        Frames per second.
+
+    Raises
+    ------
+    OSError
+        From `add`, when the film cannot be encoded.
+
+    """
+
+    def __init__(self, path: Path, fps: float) -> None:
+        self._path = path
+        self._fps = min(max(fps, 1.0), 240.0)
+        self._display_range = DisplayRange()
+        self._writer: cv2.VideoWriter | None = None
+        self._size = (0, 0)
+
+    def __enter__(self) -> OverlayVideo:
+        """Return the film."""
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None,
+                 trace: TracebackType | None) -> None:
+        """Finish the film."""
+        if self._writer is not None:
+            self._writer.release()
+
+    def add(self, image: npt.NDArray, result: TrackResult, *, label: str = '',
+            truth: BoundingBox | None = None) -> npt.NDArray[np.uint8]:
+        """
+        Append one frame and return its 8-bit view without drawings.
+
+        Parameters
+        ----------
+        image : ndarray, shape (H, W) or (H, W, 3)
+            Frame as it was tracked.
+        result : TrackResult
+            What to draw.
+        label : str
+            Text for the lower left corner.
+        truth : BoundingBox, optional
+            Known box, drawn in white.
+
+        """
+        view = self._display_range.apply(image)
+        factor = enlargement(view.shape[0])
+        large = cv2.resize(view, None, fx=factor, fy=factor, interpolation=cv2.INTER_CUBIC) \
+            if factor > 1 else view
+        if truth is not None:
+            large = cv2.cvtColor(large, cv2.COLOR_GRAY2BGR) if large.ndim == 2 else large.copy()
+            draw_box(large, scaled(truth, factor), _TRUTH_COLOR, dashed=True)
+        canvas = draw_overlay(large, replace(result, box=scaled(result.box, factor)),
+                              label=label)
+        self._write(canvas)
+        return view
+
+    def _write(self, canvas: npt.NDArray[np.uint8]) -> None:
+        if self._writer is None:
+            # Encoders want even sizes; a film keeps the size of its first frame.
+            self._size = (canvas.shape[1] + canvas.shape[1] % 2,
+                          canvas.shape[0] + canvas.shape[0] % 2)
+            codec = cv2.VideoWriter.fourcc(*'mp4v')
+            self._writer = cv2.VideoWriter(str(self._path), codec, self._fps, self._size)
+            if not self._writer.isOpened():
+                raise OSError(f'{self._path} cannot be encoded as a film; '
+                              'check the place and the free space')
+        width, height = self._size
+        right, below = width - canvas.shape[1], height - canvas.shape[0]
+        if 0 <= right <= 1 and 0 <= below <= 1:
+            canvas = cv2.copyMakeBorder(canvas, 0, below, 0, right, cv2.BORDER_REPLICATE)
+        else:
+            canvas = cv2.resize(canvas, self._size, interpolation=cv2.INTER_AREA)
+        self._writer.write(canvas)
+
+
+def enlargement(height: int) -> int:
+    """Return the whole factor that shows an image of `height` pixels comfortably."""
+    return max(1, -(-_COMFORTABLE_HEIGHT // height)) if height < 0.75 * _COMFORTABLE_HEIGHT else 1
+
+
+def scaled(box: BoundingBox, factor: float) -> BoundingBox:
+    """Return `box` in an image that is `factor` times as large."""
+    return BoundingBox(*(factor * value for value in box.as_tuple()))
