@@ -22,16 +22,17 @@ from typing import Any
 from array_api_compat import array_namespace, is_torch_array
 import array_api_compat.numpy as numpy_namespace
 import cv2
-from lmsco_ros.core.errors import ConfigError
 import numpy as np
 import scipy.fft
 from threadpoolctl import threadpool_limits
 
+from lmsco_ros.core.errors import ConfigError
+
 Array = Any
 """An array of any library that follows the Python array API standard."""
 
-__all__ = ['Array', 'Backend', 'array_namespace', 'irfft2', 'limit_threads', 'rfft2',
-           'select_backend', 'to_numpy']
+__all__ = ['Array', 'Backend', 'array_namespace', 'irfft2', 'limit_threads', 'real_matmul',
+           'rfft2', 'select_backend', 'to_numpy']
 
 
 @dataclass(frozen=True)
@@ -47,6 +48,7 @@ class Backend:
         Device of new arrays, in the terms of `namespace`.
     dtype : str
         'float32' or 'float64'; spectra have the complex type of the same precision.
+
     """
 
     namespace: Any
@@ -84,6 +86,7 @@ def select_backend(device_name: str, dtype: str = 'float32') -> Backend:
     ------
     ConfigError
         When the device is unknown or not present.
+
     """
     if device_name == 'cpu':
         return Backend(numpy_namespace, 'cpu', dtype)
@@ -117,6 +120,25 @@ def irfft2(spectrum: Array, size: int) -> Array:
     if is_torch_array(spectrum):
         return array_namespace(spectrum).fft.irfftn(spectrum, s=(size, size), axes=(0, 1))
     return scipy.fft.irfftn(spectrum, s=(size, size), axes=(0, 1))
+
+
+def real_matmul(matrix: Array, values: Array) -> Array:
+    """
+    Return `matrix` @ `values` for a real matrix and complex values.
+
+    Parameters
+    ----------
+    matrix : array, shape (m, n)
+        Real.
+    values : array, shape (..., n, c)
+        Complex, contiguous; half the multiplications of a complex product.
+
+    """
+    if is_torch_array(values):
+        import torch
+        pairs = torch.view_as_real(values).flatten(-2)
+        return torch.view_as_complex((matrix @ pairs).unflatten(-1, (-1, 2)))
+    return (matrix @ values.view(matrix.dtype)).view(values.dtype)
 
 
 def to_numpy(values: Array) -> np.ndarray:

@@ -19,9 +19,10 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 import math
 
+import numpy as np
+
 from lmsco_ros.core.config import ConfidenceConfig
 from lmsco_ros.core.types import TrackState
-import numpy as np
 
 __all__ = ['ConfidenceMonitor', 'peak_to_sidelobe_ratio']
 
@@ -40,6 +41,7 @@ def peak_to_sidelobe_ratio(grid: np.ndarray, exclude: int) -> float:
     Notes
     -----
     Bolme et al., MOSSE, CVPR 2010.
+
     """
     size = grid.shape[0]
     row, column = np.unravel_index(np.argmax(grid), grid.shape)
@@ -62,6 +64,7 @@ class ConfidenceMonitor:
     ----------
     config : ConfidenceConfig
         Thresholds.
+
     """
 
     config: ConfidenceConfig

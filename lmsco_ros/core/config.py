@@ -21,9 +21,10 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
+import yaml
+
 from lmsco_ros.core.errors import ConfigError
 from lmsco_ros.core.validation import build, check_choice, check_range
-import yaml
 
 __all__ = ['ConfidenceConfig', 'FeatureConfig', 'IntensityConfig', 'LearningConfig',
            'RuntimeConfig', 'SamplingConfig', 'ScaleConfig', 'TrackerConfig']
@@ -42,6 +43,7 @@ class IntensityConfig:
         Part of the way that the range follows a small change in one frame, in (0, 1].
     jump : float
         Change, as a part of the range, above which the range is adopted at once.
+
     """
 
     low_percentile: float = 1.0
@@ -68,11 +70,12 @@ class SamplingConfig:
         Side of the square search region over sqrt(target width * height).
     patch_size_min, patch_size_max : int
         Limits of the side of the patch, in pixels; the search region is resampled into them.
+
     """
 
     search_factor: float = 5.0
-    patch_size_min: int = 180
-    patch_size_max: int = 180
+    patch_size_min: int = 140
+    patch_size_max: int = 140
 
     def __post_init__(self) -> None:
         """Check the ranges."""
@@ -84,25 +87,28 @@ class SamplingConfig:
 @dataclass(frozen=True)
 class FeatureConfig:
     """
-    One block of feature channels.
+    One block: feature channels on a common grid, which share a resolution.
 
     Attributes
     ----------
-    kind : {'hog', 'intensity'}
-        What the channels are.
+    channels : tuple of {'hog', 'intensity'}
+        Groups of channels, each normalized on its own.
     cell : int
         Side of a cell in patch pixels.
     weight : float
-        Factor on the normalized block.
+        Factor on the normalized channels.
+
     """
 
-    kind: str
+    channels: tuple[str, ...]
     cell: int = 4
     weight: float = 1.0
 
     def __post_init__(self) -> None:
         """Check the ranges."""
-        check_choice(self, 'kind', ('hog', 'intensity'))
+        if not self.channels or not set(self.channels) <= {'hog', 'intensity'}:
+            raise ConfigError(f'FeatureConfig.channels is {list(self.channels)}; expected some of '
+                              'hog, intensity')
         check_range(self, 'cell', 1, 32)
         check_range(self, 'weight', 0, 100, open_low=True)
 
@@ -140,6 +146,7 @@ class LearningConfig:
         Conjugate gradient steps in each outer iteration.
     update_interval : int
         Frames between two updates; every frame is stored.
+
     """
 
     anchor: str = 'unit'
@@ -188,7 +195,7 @@ class ScaleConfig:
     exponent_min, exponent_max : int
         Range of the exponents of `step`.
     learning_rate : float
-        Of the scale filter.
+        Of the scale filter, which learns in the frames in which the filter is trained.
     model_area : float
         Area of a scale sample in pixels.
     padding : float
@@ -197,13 +204,14 @@ class ScaleConfig:
         Ridge term of the scale filter.
     label_sigma : float
         Standard deviation of its label, in scales.
+
     """
 
     estimator: str = 'filter'
     step: float = 1.03
     exponent_min: int = -8
     exponent_max: int = 8
-    learning_rate: float = 0.025
+    learning_rate: float = 0.12
     model_area: float = 512.0
     padding: float = 1.0
     regularization: float = 0.01
@@ -240,6 +248,7 @@ class ConfidenceConfig:
         Sharpness, as a part of the reference, from which a LOST target counts as found.
     tiles : int
         Other regions of the image that are searched per frame while the target is missing.
+
     """
 
     reference_frames: int = 10
@@ -270,6 +279,7 @@ class RuntimeConfig:
         'cpu', 'cuda' or 'cuda:N'.
     threads : int
         Threads of the numerical libraries in this process.
+
     """
 
     device: str = 'cpu'
@@ -281,8 +291,8 @@ class RuntimeConfig:
 
 
 def _hcs_features() -> tuple[FeatureConfig, ...]:
-    """Return the handcrafted blocks."""
-    return (FeatureConfig('hog'), FeatureConfig('intensity'))
+    """Return the handcrafted block."""
+    return (FeatureConfig(('hog', 'intensity')),)
 
 
 @dataclass(frozen=True)
@@ -303,6 +313,7 @@ class TrackerConfig:
     ------
     ConfigError
         When a value is out of its range; says which and what was expected.
+
     """
 
     features: tuple[FeatureConfig, ...] = field(default_factory=_hcs_features)
@@ -319,7 +330,7 @@ class TrackerConfig:
         check_range(self, 'newton_steps', 0, 100)
         if not self.features:
             raise ConfigError('TrackerConfig.features is empty; name at least one block, '
-                              'for instance {kind: hog}')
+                              'for instance {channels: [hog]}')
 
     @classmethod
     def preset(cls, name: str) -> TrackerConfig:

@@ -19,9 +19,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import cv2
+import numpy as np
+
 from lmsco_ros.core.config import IntensityConfig
 from lmsco_ros.core.errors import ImageError
-import numpy as np
 
 __all__ = ['AutomaticGain', 'IntensityRange', 'check_image', 'to_gray']
 
@@ -38,6 +39,7 @@ class IntensityRange:
     ----------
     low, high : float
         Counts; high > low.
+
     """
 
     low: float
@@ -57,6 +59,7 @@ def check_image(image: np.ndarray) -> None:
     ----------
     image : ndarray, shape (H, W) uint8, uint16 or float32, or (H, W, 3) uint8
         Anything else is refused.
+
     """
     if not isinstance(image, np.ndarray):
         raise ImageError(f'the image is a {type(image).__name__}; expected a NumPy array')
@@ -88,6 +91,7 @@ class AutomaticGain:
     ----------
     config : IntensityConfig
         Percentiles and rates.
+
     """
 
     def __init__(self, config: IntensityConfig) -> None:

@@ -20,11 +20,12 @@ from dataclasses import dataclass
 import math
 
 import cv2
+import numpy as np
+
 from lmsco_ros.core.config import SamplingConfig
 from lmsco_ros.core.errors import BoxError
 from lmsco_ros.core.intensity import IntensityRange, to_gray
 from lmsco_ros.core.types import BoundingBox
-import numpy as np
 
 __all__ = ['FrameView', 'check_box', 'clamp_box', 'patch_size', 'region_around', 'search_tiles']
 
@@ -43,6 +44,7 @@ class FrameView:
         The frame, not copied.
     intensity : IntensityRange
         Working range.
+
     """
 
     image: np.ndarray
@@ -69,6 +71,7 @@ class FrameView:
         ndarray, shape (height, width), float32
             Intensities in the working range. A region with more pixels than the patch is
             averaged, not skipped through.
+
         """
         step = (region.width / size[0], region.height / size[1])
         factor = (max(1, int(step[0])), max(1, int(step[1])))
@@ -82,7 +85,8 @@ class FrameView:
             values = np.nan_to_num(values, copy=False, nan=0.0, posinf=1.0, neginf=0.0)
         start = ((region.x + step[0] / 2 - x0) / factor[0] - 0.5,
                  (region.y + step[1] / 2 - y0) / factor[1] - 0.5)
-        inverse = np.array([[step[0] / factor[0], 0, start[0]], [0, step[1] / factor[1], start[1]]])
+        inverse = np.array([[step[0] / factor[0], 0, start[0]],
+                            [0, step[1] / factor[1], start[1]]])
         return cv2.warpAffine(values, inverse, size, flags=cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP,
                               borderMode=cv2.BORDER_REPLICATE)
 
@@ -124,6 +128,7 @@ def patch_size(size: tuple[float, float], config: SamplingConfig, cell: int) -> 
     cell : int
         The side is a multiple of it; the number of cells is odd and a product of small primes,
         on which Fourier transforms are fast.
+
     """
     side = config.search_factor * math.sqrt(size[0] * size[1])
     wanted = min(max(side, config.patch_size_min), config.patch_size_max)
@@ -154,6 +159,7 @@ def search_tiles(image_size: tuple[int, int], side: float,
         Side of a region; neighbors overlap by half of it.
     around : tuple of float
         Point (x, y) from which the search spreads.
+
     """
     axes = []
     for length in image_size:
@@ -173,6 +179,7 @@ def check_box(box: BoundingBox, image_size: tuple[int, int]) -> None:
         Target; may reach over the border of the image.
     image_size : tuple of int
         Width and height.
+
     """
     if min(box.size) < _SMALLEST_TARGET:
         raise BoxError(f'box {box.as_tuple()} is smaller than {_SMALLEST_TARGET:g} pixels; '
@@ -194,6 +201,7 @@ def clamp_box(box: BoundingBox, image_size: tuple[int, int]) -> BoundingBox:
         Estimated target.
     image_size : tuple of int
         Width and height.
+
     """
     center = tuple(min(max(c, 0.0), float(length))
                    for c, length in zip(box.center, image_size, strict=True))

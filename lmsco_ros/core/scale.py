@@ -19,13 +19,14 @@ from __future__ import annotations
 import math
 from typing import Protocol
 
+import cv2
+import numpy as np
+import scipy.fft
+
 from lmsco_ros.core.config import ScaleConfig
 from lmsco_ros.core.features.hog import hog
 from lmsco_ros.core.sampling import FrameView
 from lmsco_ros.core.types import BoundingBox
-import cv2
-import numpy as np
-import scipy.fft
 
 __all__ = ['FixedScale', 'ScaleEstimator', 'ScaleFilter', 'ScaleSearch', 'make_scale_estimator',
            'scale_factors']
@@ -41,6 +42,7 @@ class ScaleEstimator(Protocol):
     ----------
     search_factors : tuple of float
         Scales, relative to the last one, at which the target is searched.
+
     """
 
     search_factors: tuple[float, ...]
@@ -60,7 +62,7 @@ def scale_factors(config: ScaleConfig) -> tuple[float, ...]:
 class FixedScale:
     """Constant size."""
 
-    search_factors = (1.0,)
+    search_factors: tuple[float, ...] = (1.0,)
 
     def learn(self, view: FrameView, box: BoundingBox) -> None:
         """Learn nothing."""
@@ -78,6 +80,7 @@ class ScaleSearch(FixedScale):
     ----------
     config : ScaleConfig
         The scales.
+
     """
 
     def __init__(self, config: ScaleConfig) -> None:
@@ -98,9 +101,10 @@ class ScaleFilter:
         Scales, model size, rates.
     size : tuple of float
         Target (width, height) in the first frame; fixes the shape of the model.
+
     """
 
-    search_factors = (1.0,)
+    search_factors: tuple[float, ...] = (1.0,)
 
     def __init__(self, config: ScaleConfig, size: tuple[float, float]) -> None:
         self._config = config
@@ -111,24 +115,22 @@ class ScaleFilter:
         self._label = scipy.fft.rfft(label.astype(np.float32))
         self._window = np.hanning(count + 2)[1:-1].astype(np.float32)
         self._model = _model_size(size, config.model_area)
-        self._numerator: np.ndarray | None = None
-        self._denominator: np.ndarray | None = None
+        self._learned = False
+        self._numerator = np.zeros(1, np.complex64)
+        self._denominator = np.zeros(1, np.float32)
 
     def learn(self, view: FrameView, box: BoundingBox) -> None:
         """Average the sample around `box` into the filter."""
         spectrum = self._sample(view, box)
         numerator = np.conj(spectrum) * self._label[:, None]
         denominator = np.mean(np.abs(spectrum)**2, axis=1)
-        if self._numerator is None or self._denominator is None:
-            self._numerator, self._denominator = numerator, denominator
-            return
-        rate = np.float32(self._config.learning_rate)
-        self._numerator += rate * (numerator - self._numerator)
-        self._denominator += rate * (denominator - self._denominator)
+        rate = np.float32(self._config.learning_rate if self._learned else 1.0)
+        self._numerator = self._numerator + rate * (numerator - self._numerator)
+        self._denominator = self._denominator + rate * (denominator - self._denominator)
+        self._learned = True
 
     def estimate(self, view: FrameView, box: BoundingBox) -> float:
         """Return the factor at the maximum of the response."""
-        assert self._numerator is not None and self._denominator is not None
         spectrum = self._sample(view, box)
         response = np.mean(self._numerator * spectrum, axis=1)
         response /= self._denominator + np.float32(self._config.regularization)

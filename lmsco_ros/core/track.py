@@ -18,6 +18,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numpy as np
+
 from lmsco_ros.core.backend import Array, array_namespace, Backend
 from lmsco_ros.core.confidence import ConfidenceMonitor, peak_to_sidelobe_ratio
 from lmsco_ros.core.config import TrackerConfig
@@ -31,7 +33,6 @@ from lmsco_ros.core.sampling import (
     check_box, clamp_box, FrameView, patch_size, region_around, search_tiles)
 from lmsco_ros.core.scale import make_scale_estimator
 from lmsco_ros.core.types import BoundingBox, TrackResult, TrackState
-import numpy as np
 
 __all__ = ['Track']
 
@@ -53,6 +54,7 @@ class Detection:
         Feature series of the region.
     sharpness : float
         Peak-to-sidelobe ratio of the score.
+
     """
 
     region: BoundingBox
@@ -94,6 +96,7 @@ class Track:
         When the box is too small or not in the image.
     ImageError
         When there is nothing to see in the search region.
+
     """
 
     def __init__(self, config: TrackerConfig, backend: Backend, image: np.ndarray,
@@ -183,8 +186,8 @@ class Track:
         self._box = clamp_box(moved.scaled(factor), view.size)
 
     def _learn(self, view: FrameView, detection: Detection) -> None:
-        """Store the sample, train when it is time, and adapt the scale filter."""
+        """Store the sample; when it is time, train the filter and the scale estimator."""
         self._operator.remember(detection.recentered_sample())
         if self._frame % self._config.learning.update_interval == 0:
             self._operator.train()
-        self._scale.learn(view, self._box)
+            self._scale.learn(view, self._box)

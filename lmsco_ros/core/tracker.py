@@ -21,13 +21,14 @@ memory -> collaborative optimization -> filter.
 
 from __future__ import annotations
 
+import numpy as np
+
 from lmsco_ros.core.backend import limit_threads, select_backend
 from lmsco_ros.core.config import TrackerConfig
 from lmsco_ros.core.errors import ImageError, NotInitializedError
 from lmsco_ros.core.intensity import check_image
 from lmsco_ros.core.track import Track
 from lmsco_ros.core.types import BoundingBox, TrackResult
-import numpy as np
 
 __all__ = ['LMSCOTracker']
 
@@ -50,6 +51,7 @@ class LMSCOTracker:
     -----
     Images are (H, W) arrays of uint8, uint16 or float32, or (H, W, 3) of uint8 (BGR). They are
     neither copied nor changed.
+
     """
 
     def __init__(self, config: TrackerConfig | None = None) -> None:
@@ -83,6 +85,7 @@ class LMSCOTracker:
         ------
         ImageError, BoxError
             When nothing could be learned; then there is no target.
+
         """
         self._track = None
         check_image(image)
@@ -105,6 +108,7 @@ class LMSCOTracker:
             When there is no target.
         ImageError
             When the frame does not fit the first one; the target is kept.
+
         """
         if self._track is None:
             raise NotInitializedError('there is no target; call initialize(image, box) first')

@@ -18,9 +18,10 @@ from dataclasses import dataclass
 from enum import Enum
 import math
 
-from lmsco_ros.core.errors import BoxError
 import numpy as np
 import numpy.typing as npt
+
+from lmsco_ros.core.errors import BoxError
 
 
 @dataclass(frozen=True)
@@ -39,6 +40,7 @@ class BoundingBox:
     ------
     BoxError
         When a number is not finite or a side is not positive.
+
     """
 
     x: float
@@ -122,6 +124,7 @@ class TrackResult:
         winning scale; cell (i, j) covers one n-th of the region in each direction.
     search_region : BoundingBox
         Region of the image that `confidence_map` covers; may exceed the image.
+
     """
 
     box: BoundingBox

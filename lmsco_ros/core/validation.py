@@ -21,8 +21,8 @@ import dataclasses
 import difflib
 import math
 import types
-import typing
 from typing import Any
+import typing
 
 from lmsco_ros.core.errors import ConfigError
 
@@ -44,6 +44,7 @@ def check_range(owner: object, name: str, low: float, high: float, *,
         Allowed range.
     open_low : bool
         Whether `low` itself is refused.
+
     """
     value = getattr(owner, name)
     if not math.isfinite(value) or value > high or value < low or (open_low and value == low):
@@ -77,6 +78,7 @@ def build(kind: type, data: Any, where: str = '') -> Any:
     ------
     ConfigError
         On an unknown key (names the nearest known one) or a value of the wrong type.
+
     """
     if not isinstance(data, Mapping):
         raise ConfigError(f'{where or "the configuration"} is {data!r}; expected keys and values: '

@@ -18,12 +18,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
+import numpy as np
+
 from lmsco_ros.core.backend import Array, Backend
 from lmsco_ros.core.config import FeatureConfig
 from lmsco_ros.core.features.hog import hog
 from lmsco_ros.core.features.intensity_channels import intensity_channels
 from lmsco_ros.core.fourier.interpolation import interpolate, interpolation_series
-import numpy as np
 
 __all__ = ['FeatureExtractor', 'hann_window', 'normalize']
 
@@ -42,11 +43,13 @@ class FeatureExtractor:
         Side of the patches in pixels, a multiple of every cell.
     backend : Backend
         Where the series go.
+
     """
 
     def __init__(self, blocks: Sequence[FeatureConfig], size: int, backend: Backend) -> None:
         self._backend = backend
-        self._channels = [_make_channels(block) for block in blocks]
+        self._channels = [[_make_channels(name, block.cell) for name in block.channels]
+                          for block in blocks]
         self._windows, self._kernels = [], []
         xp = backend.namespace
         for block in blocks:
@@ -69,19 +72,21 @@ class FeatureExtractor:
         -------
         list of array, shape (2K_l + 1, K_l + 1, C_l)
             Series of the interpolated, normalized, windowed channels.
+
         """
         result = []
         for channels, window, kernel in zip(self._channels, self._windows, self._kernels,
                                             strict=True):
-            block = normalize(channels(patch)) * window
+            block = np.concatenate([normalize(group(patch)) for group in channels], axis=-1)
+            block *= window
             result.append(interpolate(self._backend.asarray(block), kernel))
         return result
 
 
-def normalize(block: np.ndarray) -> np.ndarray:
-    """Return the block with a mean square of 1; a block of zeros stays one."""
-    energy = float(np.mean(block**2))
-    return block / np.float32(np.sqrt(energy)) if energy > 0 else block
+def normalize(channels: np.ndarray) -> np.ndarray:
+    """Return the channels with a mean square of 1; zeros stay zeros."""
+    energy = float(np.mean(channels**2))
+    return channels / np.float32(np.sqrt(energy)) if energy > 0 else channels
 
 
 def hann_window(size: int) -> np.ndarray:
@@ -90,8 +95,8 @@ def hann_window(size: int) -> np.ndarray:
     return axis[:, None] * axis[None, :]
 
 
-def _make_channels(block: FeatureConfig) -> Channels:
-    """Return the function that computes the channels of a block."""
-    if block.kind == 'hog':
-        return lambda patch: hog(patch[None], block.cell)[0]
-    return lambda patch: intensity_channels(patch, block.cell)
+def _make_channels(name: str, cell: int) -> Channels:
+    """Return the function that computes a group of channels, shape (N, N, C), of a patch."""
+    if name == 'hog':
+        return lambda patch: hog(patch[None], cell)[0]
+    return lambda patch: intensity_channels(patch, cell)

@@ -50,6 +50,7 @@ def hog(patches: np.ndarray, cell: int, noise_energy: float = 1e-4) -> np.ndarra
     Returns
     -------
     ndarray, shape (n, H // cell, W // cell, 31), float32
+
     """
     histogram = _pool(_orientation_planes(patches), cell)
     unsigned = histogram[:, :_UNSIGNED] + histogram[:, _UNSIGNED:]

@@ -38,6 +38,7 @@ def intensity_channels(patch: np.ndarray, cell: int) -> np.ndarray:
     ndarray, shape (N, N, 2), float32
         Cell mean minus the median cell of the patch, and minus the mean of the 9 x 9 cells
         around it.
+
     """
     cells = patch.shape[0] // cell
     means = cv2.resize(patch, (cells, cells), interpolation=cv2.INTER_AREA)

@@ -16,9 +16,10 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from lmsco_ros.core.backend import Array
 from lmsco_ros.core.fourier.series import analyze
-import numpy as np
 
 CUBIC_PARAMETER = -0.75
 """Free parameter a of the cubic kernel (Keys), as in C-COT."""
@@ -37,6 +38,7 @@ def cubic_spectrum(frequency: np.ndarray) -> np.ndarray:
     -----
     B(f) = [6 (1 - cos 2 pi f) + 3 a (1 - cos 4 pi f) - (6 + 8 a) pi f sin 2 pi f
     - 2 a pi f sin 4 pi f] / (4 pi^4 f^4), B(0) = 1.
+
     """
     a = CUBIC_PARAMETER
     frequency = np.asarray(frequency, dtype=np.float64)
@@ -56,6 +58,7 @@ def interpolation_series(size: int) -> np.ndarray:
     ndarray, shape (2K + 1, K + 1), complex128
         N^2 b[ky] b[kx] with b[k] = B(k / N) exp(-i pi k / N) / N: the phase puts the sample of
         a cell at the middle of the cell, the factor fits the mean-normalized `analyze`.
+
     """
     order = (size - 1) // 2
     k = np.arange(-order, order + 1)
@@ -78,6 +81,7 @@ def interpolate(block: Array, kernel: Array) -> Array:
     -------
     array, shape (2K + 1, K + 1, C)
         Coefficients of the interpolated channels (paper, (4)).
+
     """
     series = analyze(block)
     series *= kernel

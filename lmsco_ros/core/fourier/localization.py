@@ -18,9 +18,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numpy as np
+
 from lmsco_ros.core.backend import Array, to_numpy
 from lmsco_ros.core.fourier.series import bandwidth, half_weights, synthesize
-import numpy as np
 
 __all__ = ['Peak', 'centered_map', 'locate', 'refine']
 
@@ -40,6 +41,7 @@ class Peak:
         Score at the maximum.
     grid : ndarray, shape (n, n)
         Scores of that scale on the grid; the origin is at [0, 0].
+
     """
 
     displacement: tuple[float, float]
@@ -60,6 +62,7 @@ def locate(scores: Array, grid_points: int, newton_steps: int) -> Peak:
         Points per axis of the coarse search, at least 2K + 1.
     newton_steps : int
         Steps of the refinement.
+
     """
     grids = to_numpy(synthesize(scores, grid_points))
     row, column, scale = np.unravel_index(np.argmax(grids), grids.shape)
@@ -92,6 +95,7 @@ def refine(series: np.ndarray, start: tuple[float, float],
     -------
     tuple
         Position (ty, tx) and value; `start` and its value where Newton lowered the score.
+
     """
     order = bandwidth(series)
     weighted = series.astype(np.complex128) * half_weights(series)

@@ -55,6 +55,7 @@ def analyze(values: Array) -> Array:
     -------
     array, shape (2K + 1, K + 1, ...), K = (N - 1) // 2
         Coefficients, the grid mean at k = 0.
+
     """
     size = int(values.shape[0])
     order = (size - 1) // 2
@@ -81,6 +82,7 @@ def synthesize(series: Array, size: int) -> Array:
     -------
     array, shape (size, size, ...)
         Real values.
+
     """
     xp = array_namespace(series)
     order = bandwidth(series)
@@ -139,6 +141,7 @@ def shift(series: Array, displacement: tuple[float, float]) -> Array:
         Coefficients.
     displacement : tuple of float
         (dy, dx) in periods: what was at `displacement` comes to the origin.
+
     """
     xp = array_namespace(series)
     order = bandwidth(series)

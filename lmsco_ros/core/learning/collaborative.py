@@ -20,11 +20,10 @@ from collections.abc import Sequence
 
 from lmsco_ros.core.backend import Array, array_namespace
 from lmsco_ros.core.fourier.series import half_weights, mean_of_squares, symmetrize
-from lmsco_ros.core.learning.conjugate_gradient import ConjugateGradient
+from lmsco_ros.core.learning.conjugate_gradient import ConjugateGradient, Images
 from lmsco_ros.core.learning.margin import MarginLoss
 from lmsco_ros.core.learning.memory import SampleMemory
-from lmsco_ros.core.learning.preconditioner import (
-    CoupledPreconditioner, FrequencyPreconditioner)
+from lmsco_ros.core.learning.preconditioner import CoupledPreconditioner, FrequencyPreconditioner
 from lmsco_ros.core.learning.regularization import SpatialWindow
 
 __all__ = ['CollaborativeOptimizer']
@@ -48,6 +47,7 @@ class CollaborativeOptimizer:
         G, one per block.
     margin_weight : float
         C.
+
     """
 
     def __init__(self, memory: SampleMemory, loss: MarginLoss,
@@ -62,19 +62,19 @@ class CollaborativeOptimizer:
 
     def optimize(self, outer: int, steps: int) -> None:
         """Run `outer` iterations with `steps` conjugate gradient steps each."""
-        scores = self._memory.forward(self.filters)
         kind = CoupledPreconditioner if self._loss.couples_frequencies else FrequencyPreconditioner
         preconditioner = kind(self._memory, self._margin_weight, self._windows[0].energy)
 
         def precondition(vector: Array) -> Array:
             return self._flatten(preconditioner.apply(self._split(vector)))
 
-        vector = self._flatten(self.filters)
+        iterates = self._images(self._flatten(self.filters))
         for _ in range(outer):
-            vector, scores = self._solver.solve(
-                vector, scores, self._residual(vector, scores), steps, self._normal,
-                precondition)
-        self.filters = [symmetrize(block) for block in self._split(vector)]
+            _, penalty, scores = iterates
+            gap = self._loss.slack_targets(scores) - self._loss.normal(scores)
+            residual = self._adjoint(gap) - penalty
+            iterates = self._solver.solve(iterates, residual, steps, self._normal, precondition)
+        self.filters = [symmetrize(block) for block in self._split(iterates[0])]
 
     def objective(self) -> float:
         """Return E(W)."""
@@ -84,21 +84,18 @@ class CollaborativeOptimizer:
         losses = self._loss.losses(self._memory.forward(self.filters))
         return penalty + self._margin_weight * float(xp.sum(self._memory.weights * losses))
 
-    def _normal(self, vector: Array) -> tuple[Array, Array]:
-        """Return the normal operator applied to a filter, and the filter's scores."""
+    def _normal(self, vector: Array) -> tuple[Array, Images]:
+        """Return the normal operator applied to a filter, and the filter's images."""
+        images = self._images(vector)
+        _, penalty, scores = images
+        return penalty + self._adjoint(self._loss.normal(scores)), images
+
+    def _images(self, vector: Array) -> Images:
+        """Return the filter W, G^H G W, and its scores of the samples."""
         filters = self._split(vector)
-        scores = self._memory.forward(filters)
-        return self._penalty(filters) + self._adjoint(self._loss.normal(scores)), scores
-
-    def _residual(self, vector: Array, scores: Array) -> Array:
-        """Return right-hand side minus left-hand side after the slack step at `scores`."""
-        gap = self._loss.slack_targets(scores) - self._loss.normal(scores)
-        return self._adjoint(gap) - self._penalty(self._split(vector))
-
-    def _penalty(self, filters: Sequence[Array]) -> Array:
-        """Return G^H G W."""
-        return self._flatten([window.gram(block)
-                              for window, block in zip(self._windows, filters, strict=True)])
+        penalty = self._flatten([window.gram(block)
+                                 for window, block in zip(self._windows, filters, strict=True)])
+        return vector, penalty, self._memory.forward(filters)
 
     def _adjoint(self, residual: Array) -> Array:
         """Return C sum_j a_j A_j^H R_j."""

@@ -20,7 +20,10 @@ from collections.abc import Callable
 
 from lmsco_ros.core.backend import Array
 
-__all__ = ['ConjugateGradient']
+__all__ = ['ConjugateGradient', 'Images']
+
+Images = tuple[Array, ...]
+"""A vector and linear images of it."""
 
 
 class ConjugateGradient:
@@ -36,6 +39,7 @@ class ConjugateGradient:
     ----------
     inner : callable
         Real inner product of two vectors in which the operator is self-adjoint.
+
     """
 
     def __init__(self, inner: Callable[[Array, Array], float]) -> None:
@@ -48,43 +52,41 @@ class ConjugateGradient:
         """Forget the direction."""
         self._direction = None
 
-    def solve(self, iterate: Array, image: Array, residual: Array, steps: int,
-              operator: Callable[[Array], tuple[Array, Array]],
-              precondition: Callable[[Array], Array]) -> tuple[Array, Array]:
+    def solve(self, iterates: Images, residual: Array, steps: int,
+              operator: Callable[[Array], tuple[Array, Images]],
+              precondition: Callable[[Array], Array]) -> Images:
         """
         Improve the solution of A x = b.
 
         Parameters
         ----------
-        iterate : array, shape (n,)
-            Current x.
-        image : array
-            Current B x, a linear image of x that the caller wants to keep.
+        iterates : tuple of array
+            Current x, shape (n,), and linear images B x of it that the caller wants to keep.
         residual : array, shape (n,)
             b - A x.
         steps : int
             Iterations.
         operator : callable
-            p -> (A p, B p).
+            p -> A p and the images of p, p itself first.
         precondition : callable
             Applies an approximate inverse of A.
 
         Returns
         -------
-        tuple
-            New x and B x.
+        tuple of array
+            New x and its images.
+
         """
         for _ in range(steps):
             direction = self._next_direction(residual, precondition(residual))
-            normal, direction_image = operator(direction)
+            normal, images = operator(direction)
             curvature = self._inner(direction, normal)
             if curvature <= 0:
                 break
             length = self._inner(direction, residual) / curvature
-            iterate = iterate + length * direction
-            image = image + length * direction_image
+            iterates = tuple(x + length * p for x, p in zip(iterates, images, strict=True))
             residual = residual - length * normal
-        return iterate, image
+        return iterates
 
     def _next_direction(self, residual: Array, descent: Array) -> Array:
         """Return the conjugate direction and remember what the next one needs."""

@@ -30,9 +30,10 @@ from __future__ import annotations
 
 from typing import Protocol
 
+import numpy as np
+
 from lmsco_ros.core.backend import Array, array_namespace, Backend
 from lmsco_ros.core.fourier.series import analyze, synthesize, value_at_origin
-import numpy as np
 
 __all__ = ['CoupledAnchor', 'FrozenAnchor', 'MarginLoss', 'UnitAnchor', 'gaussian_label',
            'make_margin_loss']
@@ -57,6 +58,7 @@ def gaussian_label(size: int, sigma: tuple[float, float]) -> np.ndarray:
     Notes
     -----
     Per axis m[k] = sqrt(2 pi) sigma exp(-2 (pi sigma k)^2).
+
     """
     k = np.fft.fftfreq(size, 1 / size)
     axes = [np.fft.ifft(np.exp(-2 * (np.pi * s * k)**2)).real for s in sigma]
@@ -72,6 +74,7 @@ class MarginLoss(Protocol):
     ----------
     couples_frequencies : bool
         Whether M^H M mixes frequencies or is the identity.
+
     """
 
     couples_frequencies: bool
@@ -96,6 +99,7 @@ class UnitAnchor:
         Desired score m on the grid of shifts.
     core : float
         The loss is two-sided where m >= core; 0 gives ridge regression.
+
     """
 
     couples_frequencies = False
@@ -134,6 +138,7 @@ class CoupledAnchor:
     ----------
     label : array, shape (N, N)
         Desired score m on the grid of shifts.
+
     """
 
     couples_frequencies = True
@@ -179,6 +184,7 @@ class FrozenAnchor:
     ----------
     label : array, shape (N, N)
         Desired score m on the grid of shifts.
+
     """
 
     couples_frequencies = False
@@ -222,8 +228,9 @@ def make_margin_loss(anchor: str, label: np.ndarray, core: float, backend: Backe
         Core of the unit anchor.
     backend : Backend
         Where the scores live.
+
     """
     values = backend.asarray(label)
     if anchor == 'unit':
         return UnitAnchor(values, core)
-    return {'coupled': CoupledAnchor, 'frozen': FrozenAnchor}[anchor](values)
+    return CoupledAnchor(values) if anchor == 'coupled' else FrozenAnchor(values)

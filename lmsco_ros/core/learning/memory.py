@@ -18,9 +18,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from lmsco_ros.core.backend import Array, Backend, array_namespace
-from lmsco_ros.core.fourier.series import bandwidth, crop, embed, grid_size
 import numpy as np
+
+from lmsco_ros.core.backend import Array, array_namespace, Backend
+from lmsco_ros.core.fourier.series import bandwidth, crop, embed, grid_size
 
 __all__ = ['PriorWeights', 'SampleMemory', 'score']
 
@@ -40,6 +41,7 @@ def score(blocks: Sequence[Array], filters: Sequence[Array]) -> Array:
     -------
     array, shape (2K + 1, K + 1, n), K the largest K_l
         Series of the scores.
+
     """
     order = max(bandwidth(block) for block in blocks)
     xp = array_namespace(blocks[0])
@@ -61,6 +63,7 @@ class PriorWeights:
         Number of slots.
     learning_rate : float
         Rate in [0, 1); 0 weighs all samples alike.
+
     """
 
     def __init__(self, capacity: int, learning_rate: float) -> None:
@@ -109,6 +112,12 @@ class SampleMemory:
         (2K_l + 1, K_l + 1, C_l) of each block.
     backend : Backend
         Where the samples live.
+
+    Attributes
+    ----------
+    mean, energy : list of array, shape (2K_l + 1, K_l + 1, C_l)
+        Running averages of Z[k] and |Z[k]|^2, each new sample entering with its prior weight.
+
     """
 
     def __init__(self, capacity: int, learning_rate: float,
@@ -118,6 +127,8 @@ class SampleMemory:
         xp = backend.namespace
         self._storage = [xp.zeros((rows, columns, capacity, channels), dtype=backend.complex,
                                   device=backend.device) for rows, columns, channels in shapes]
+        self.mean = [0 * block[:, :, 0, :] for block in self._storage]
+        self.energy = [xp.real(block) for block in self.mean]
 
     def __len__(self) -> int:
         """Return the number of samples."""
@@ -146,8 +157,12 @@ class SampleMemory:
     def add(self, sample: Sequence[Array]) -> int:
         """Store a sample, one series (2K_l + 1, K_l + 1, C_l) per block; return its slot."""
         slot = self._prior.take_slot()
-        for storage, series in zip(self._storage, sample, strict=True):
-            storage[:, :, slot, :] = series
+        weight = float(self._prior.values[slot])
+        xp = array_namespace(self._storage[0])
+        for i, series in enumerate(sample):
+            self._storage[i][:, :, slot, :] = series
+            self.mean[i] += weight * (series - self.mean[i])
+            self.energy[i] += weight * (xp.real(xp.conj(series) * series) - self.energy[i])
         return slot
 
     def forward(self, filters: Sequence[Array]) -> Array:
@@ -162,6 +177,7 @@ class SampleMemory:
         ----------
         residual : array, shape (2K + 1, K + 1, n)
             One series per sample.
+
         """
         xp = array_namespace(residual)
         weighted = xp.conj(residual) * self.weights
@@ -170,15 +186,3 @@ class SampleMemory:
             rows = xp.expand_dims(crop(weighted, bandwidth(block)), axis=-2)
             result.append(xp.conj(xp.matmul(rows, block)[..., 0, :]))
         return result
-
-    def mean(self) -> list[Array]:
-        """Return the weighted mean sample, per block."""
-        xp = array_namespace(self._storage[0])
-        weights = xp.astype(self.weights, self._backend.complex)
-        return [xp.matmul(weights, block) for block in self.blocks]
-
-    def energy(self) -> list[Array]:
-        """Return sum_j a_j |Z_j[k]|^2, per block, shape (2K_l + 1, K_l + 1, C_l), real."""
-        xp = array_namespace(self._storage[0])
-        return [xp.matmul(self.weights, xp.real(xp.conj(block) * block))
-                for block in self.blocks]

@@ -43,11 +43,12 @@ class FrequencyPreconditioner:
         C.
     window_energy : float
         Diagonal of G^H G.
+
     """
 
     def __init__(self, memory: SampleMemory, margin_weight: float, window_energy: float) -> None:
         self._parts = []
-        for energy, mean in zip(memory.energy(), memory.mean(), strict=True):
+        for energy, mean in zip(memory.energy, memory.mean, strict=True):
             xp = array_namespace(mean)
             power = xp.real(xp.conj(mean) * mean)
             inverse = 1 / (margin_weight * xp.clip(energy - power, min=0) + window_energy)
@@ -82,12 +83,13 @@ class CoupledPreconditioner:
         C.
     window_energy : float
         Diagonal of G^H G.
+
     """
 
     def __init__(self, memory: SampleMemory, margin_weight: float, window_energy: float) -> None:
         self._inverses = [1 / (margin_weight * energy + window_energy)
-                          for energy in memory.energy()]
-        self._means = memory.mean()
+                          for energy in memory.energy]
+        self._means = [+mean for mean in memory.mean]
         for mean in self._means:
             mean[bandwidth(mean), 0, :] = 0
         power = sum(self._total(mean * inverse, array_namespace(mean).conj(mean))

@@ -18,8 +18,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from lmsco_ros.core.backend import Array, array_namespace, Backend
 import numpy as np
+
+from lmsco_ros.core.backend import Array, array_namespace, Backend, real_matmul
 
 __all__ = ['CrossSeries', 'SpatialWindow', 'window_series']
 
@@ -35,6 +36,7 @@ class CrossSeries:
         Coefficient at k = 0.
     vertical, horizontal : ndarray, shape (r,)
         Real, symmetric coefficients of u and v for the frequencies 1..r.
+
     """
 
     constant: float
@@ -68,6 +70,7 @@ def window_series(target: tuple[float, float], minimum: float, edge: float,
     the middle of the period, where the filter lives. The parabola (t - 1/2)^2 on [0, 1) has
     the coefficients 1 / 12 at k = 0 and 1 / (2 pi^2 k^2) elsewhere, all of them positive. What
     the threshold takes away lowers the minimum, which the constant then restores.
+
     """
     curvature = [(edge - minimum) * (2 / side)**2 for side in target]
     largest = minimum + sum(curvature) / 12
@@ -94,6 +97,7 @@ class SpatialWindow:
         Bandwidth of the filters.
     backend : Backend
         Where the filters live.
+
     """
 
     def __init__(self, series: CrossSeries, order: int, backend: Backend) -> None:
@@ -103,9 +107,8 @@ class SpatialWindow:
         self._reach = min(len(series.horizontal), order)
         columns = _banded(series.horizontal, np.arange(order + 1),
                           np.arange(-self._reach, order + 1))
-        xp = backend.namespace
-        self._rows = xp.astype(backend.asarray(rows), backend.complex)
-        self._columns = xp.astype(backend.asarray(columns), backend.complex)
+        self._rows = backend.asarray(rows)
+        self._columns = backend.asarray(columns)
 
     def apply(self, series: Array) -> Array:
         """
@@ -115,12 +118,14 @@ class SpatialWindow:
         ----------
         series : array, shape (2K + 1, K + 1, C)
             Filter coefficients.
+
         """
         xp = array_namespace(series)
         mirrored = xp.conj(xp.flip(series[:, 1:self._reach + 1, :], axis=(0, 1)))
-        across = xp.matmul(self._columns, xp.concat([mirrored, series], axis=1))
-        along = xp.matmul(self._rows, xp.reshape(series, (series.shape[0], -1)))
-        return across + xp.reshape(along, series.shape)
+        result = real_matmul(self._columns, xp.concat([mirrored, series], axis=1))
+        along = real_matmul(self._rows, xp.reshape(series, (series.shape[0], -1)))
+        result += xp.reshape(along, series.shape)
+        return result
 
     def gram(self, series: Array) -> Array:
         """Return G^H G W."""

@@ -43,6 +43,7 @@ class StructuredOperator:
         (h, w) of the target in periods.
     backend : Backend
         Where the series live.
+
     """
 
     def __init__(self, config: LearningConfig, sample: Sequence[Array],
@@ -77,6 +78,7 @@ class StructuredOperator:
         -------
         array, shape (2K + 1, K + 1, n)
             Series of the scores (paper, (5)).
+
         """
         return score(samples, self.filters)
 
