@@ -120,8 +120,8 @@ class Track:
 
     def first_result(self) -> TrackResult:
         """Return the result of the first frame: the given box."""
-        return TrackResult(self._box, 1.0, TrackState.TRACKING, centered_map(self._first.peak.grid),
-                           self._first.region)
+        return TrackResult(self._box, 1.0, TrackState.TRACKING,
+                           centered_map(self._first.peak.grid), self._first.region)
 
     def advance(self, image: np.ndarray) -> TrackResult:
         """Find the target in the next frame, and learn from it if it can be trusted."""

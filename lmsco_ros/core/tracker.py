@@ -67,7 +67,7 @@ class LMSCOTracker:
 
     def initialize(self, image: np.ndarray, box: BoundingBox) -> TrackResult:
         """
-        Start to follow the target in `box`; a former target is forgotten.
+        Start to follow the target in `box`, in place of a former one.
 
         Parameters
         ----------
@@ -84,14 +84,12 @@ class LMSCOTracker:
         Raises
         ------
         ImageError, BoxError
-            When nothing could be learned; then there is no target.
+            When nothing can be learned from the box; a former target is kept.
 
         """
-        self._track = None
         check_image(image)
-        track = Track(self.config, self._backend, image, box)
-        self._track = track
-        return track.first_result()
+        self._track = Track(self.config, self._backend, image, box)
+        return self._track.first_result()
 
     def update(self, image: np.ndarray) -> TrackResult:
         """

@@ -21,8 +21,8 @@ import dataclasses
 import difflib
 import math
 import types
-from typing import Any
 import typing
+from typing import Any
 
 from lmsco_ros.core.errors import ConfigError
 
