@@ -1,0 +1,293 @@
+# Copyright 2026 lmsco_ros contributors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+References written from the definitions, and scenes whose truth is known.
+
+The references work with functions on a grid and explicit sums of exponentials; they share no
+code with the half spectra of the tracker.
+"""
+
+from types import SimpleNamespace
+
+import array_api_compat.numpy as numpy_namespace
+from lmsco_ros.core import BoundingBox
+from lmsco_ros.core.backend import Backend
+import numpy as np
+import pytest
+
+
+@pytest.fixture
+def backend():
+    """Return NumPy in double precision."""
+    return Backend(numpy_namespace, 'cpu', 'float64')
+
+
+@pytest.fixture
+def rng():
+    """Return a random generator that starts the same way in every test."""
+    return np.random.default_rng(7)
+
+
+class Band:
+    """
+    Real periodic functions with frequencies |ky|, |kx| <= `order`, on `size` x `size` points.
+
+    Parameters
+    ----------
+    order : int
+        Bandwidth K.
+    size : int
+        Points per axis.
+    """
+
+    def __init__(self, order, size):
+        self.order, self.size = order, size
+        t = np.arange(size) / size
+        k = np.arange(-order, order + 1)
+        waves = np.exp(2j * np.pi * np.outer(t, k))
+        self.waves = np.einsum('ay,bx->abyx', waves, waves).reshape(size**2, -1)
+
+    def values(self, series):
+        """Return the function of a half spectrum by summing its whole spectrum."""
+        count = 2 * self.order + 1
+        full = np.zeros((count, count, *series.shape[2:]), complex)
+        for ky in range(-self.order, self.order + 1):
+            for kx in range(-self.order, self.order + 1):
+                if kx >= 0:
+                    full[ky + self.order, kx + self.order] = series[ky + self.order, kx]
+                else:
+                    full[ky + self.order, kx + self.order] = np.conj(
+                        series[-ky + self.order, -kx])
+        result = np.tensordot(self.waves, full.reshape(count**2, *series.shape[2:]), axes=1)
+        assert np.abs(result.imag).max() < 1e-9 * (1 + np.abs(result).max())
+        return result.real.reshape(self.size, self.size, *series.shape[2:])
+
+    def series(self, values):
+        """Return the half spectrum of the part of a function that lies in the band."""
+        count = 2 * self.order + 1
+        full = np.tensordot(self.waves.conj().T, values.reshape(self.size**2, *values.shape[2:]),
+                            axes=1) / self.size**2
+        return full.reshape(count, count, *values.shape[2:])[:, self.order:]
+
+    def basis(self):
+        """Return real functions, orthonormal in the mean over the grid, shape (N^2, d)."""
+        columns = [np.ones(self.size**2)]
+        count = 2 * self.order + 1
+        for index in range(count**2 // 2 + 1, count**2):
+            columns.append(np.sqrt(2) * self.waves[:, index].real)
+            columns.append(np.sqrt(2) * self.waves[:, index].imag)
+        return np.stack(columns, axis=1)
+
+    def random(self, rng, *trailing):
+        """Return the half spectrum of a random function."""
+        return self.series(rng.normal(size=(self.size, self.size, *trailing)))
+
+
+@pytest.fixture
+def band():
+    """Return a factory of bands, on the smallest grid that carries them unless told."""
+    return lambda order, size=None: Band(order, size or 2 * order + 1)
+
+
+def evaluate(series, ty, tx):
+    """Return the value of a half spectrum at one point, frequency by frequency."""
+    order = series.shape[1] - 1
+    total = 0.0
+    for ky in range(-order, order + 1):
+        for kx in range(order + 1):
+            wave = series[ky + order, kx] * np.exp(2j * np.pi * (ky * ty + kx * tx))
+            total = total + (1 if kx == 0 else 2) * wave.real
+    return total
+
+
+@pytest.fixture(name='evaluate')
+def evaluate_fixture():
+    """Return the pointwise evaluation of a series."""
+    return evaluate
+
+
+def parabolic_window(target, minimum, edge, threshold, size):
+    """
+    Return gamma on a grid, and how many coefficients it keeps.
+
+    The parabola is sampled on a fine grid, its DFT thresholded, and its minimum restored, as the
+    definition says.
+    """
+    fine = 1024
+    t = (np.arange(fine) + 0.5) / fine
+    axes = [(edge - minimum) * (np.abs(t - 0.5) / (side / 2))**2 for side in target]
+    # The window is a sum of two one-dimensional parabolas: so is its spectrum.
+    k = np.arange(-40, 41)
+    spectra = [np.array([np.mean(axis * np.exp(-2j * np.pi * f * t)) for f in k])
+               for axis in axes]
+    full = np.zeros((81, 81), complex)
+    full[:, 40] += spectra[0]
+    full[40, :] += spectra[1]
+    full[40, 40] += minimum
+    full[np.abs(full) < threshold * np.abs(full).max()] = 0
+    waves = np.exp(2j * np.pi * np.outer(np.arange(240) / 240, k))
+    trough = (waves @ full @ waves.T).real.min()
+    full[40, 40] += minimum - trough
+    waves = np.exp(2j * np.pi * np.outer(np.arange(size) / size, k))
+    return (waves @ full @ waves.T).real, int(np.count_nonzero(full))
+
+
+@pytest.fixture(name='parabolic_window')
+def parabolic_window_fixture():
+    """Return the spatial window by sampling, thresholding and restoring."""
+    return parabolic_window
+
+
+def dense_problem(blocks, weights, gamma, margin_weight):
+    """
+    Assemble the training problem on the grid from its definition.
+
+    Parameters
+    ----------
+    blocks : list of (Band, ndarray (N, N, n, C))
+        Band of each filter and values of its samples on the grid that all blocks share.
+    weights : ndarray, shape (n,)
+        Sample weights.
+    gamma : ndarray, shape (F, F)
+        Window on a grid fine enough for its products with the filters.
+    margin_weight : float
+        C.
+
+    Returns
+    -------
+    namespace
+        `scores` (n, N^2, d): filter coordinates to scores; `penalty` (d, d): G^T G; `pack` and
+        `unpack`: half spectra to coordinates and back.
+    """
+    size = blocks[0][0].size
+    fine = gamma.shape[0]
+    parts, grams = [], []
+    for space, samples in blocks:
+        basis = space.basis()
+        wide = Band(space.order, fine).basis()
+        product = wide.T @ (gamma.reshape(-1, 1) * wide) / fine**2
+        for channel in range(samples.shape[3]):
+            parts.append(np.stack([
+                convolution_matrix(samples[:, :, j, channel]) @ basis
+                for j in range(samples.shape[2])]))
+            grams.append(product.T @ product)
+    scores = np.concatenate(parts, axis=2)
+    penalty = np.zeros((scores.shape[2],) * 2)
+    start = 0
+    for gram in grams:
+        penalty[start:start + len(gram), start:start + len(gram)] = gram
+        start += len(gram)
+
+    def pack(filters):
+        return np.concatenate([
+            space.basis().T @ space.values(block)[:, :, c].reshape(-1) / size**2
+            for (space, _), block in zip(blocks, filters, strict=True)
+            for c in range(block.shape[2])])
+
+    def unpack(coordinates):
+        filters, first = [], 0
+        for space, samples in blocks:
+            channels = []
+            for _ in range(samples.shape[3]):
+                basis = space.basis()
+                part = coordinates[first:first + basis.shape[1]]
+                channels.append(space.series((basis @ part).reshape(size, size)))
+                first += basis.shape[1]
+            filters.append(np.stack(channels, axis=-1))
+        return filters
+
+    return SimpleNamespace(scores=scores, penalty=penalty, pack=pack, unpack=unpack,
+                           weights=np.asarray(weights), margin_weight=margin_weight)
+
+
+def convolution_matrix(values):
+    """Return the matrix of w -> mean_u z(t - u) w(u) on the grid of z."""
+    size = values.shape[0]
+    index = (np.arange(size)[:, None] - np.arange(size)[None, :]) % size
+    matrix = values[index[:, None, :, None], index[None, :, None, :]]
+    return matrix.reshape(size**2, size**2) / size**2
+
+
+@pytest.fixture(name='dense_problem')
+def dense_problem_fixture():
+    """Return the assembly of a training problem from its definition."""
+    return dense_problem
+
+
+class Scene:
+    """
+    A textured warm target over a textured background, known at every point of the plane.
+
+    Parameters
+    ----------
+    size : tuple of int
+        Width and height in pixels.
+    seed : int
+        Seed of the textures.
+    """
+
+    def __init__(self, size=(160, 128), seed=3):
+        self.size = size
+        rng = np.random.default_rng(seed)
+        self._back = _waves(rng, 40, 0.03, 0.25)
+        self._front = _waves(rng, 12, 0.5, 2.0)
+
+    def render(self, center=None, target=(24.0, 18.0)):
+        """Return the frame, in counts; without `center` the target is not there."""
+        x, y = np.meshgrid(np.arange(self.size[0]) + 0.5, np.arange(self.size[1]) + 0.5)
+        counts = 7000 + 60 * _sum(self._back, x, y)
+        if center is not None:
+            u, v = (x - center[0]) / target[0], (y - center[1]) / target[1]
+            warm = 7500 + 80 * _sum(self._front, u, v)
+            # Pixels are integrals: the edge of the target is one pixel wide.
+            mask = _edge(x - center[0], target[0]) * _edge(y - center[1], target[1])
+            counts = counts + mask * (warm - counts)
+        return counts
+
+    def frame(self, center=None, target=(24.0, 18.0)):
+        """Return the frame as a camera with 16 bits gives it."""
+        return np.round(self.render(center, target)).astype(np.uint16)
+
+
+def _waves(rng, count, low, high):
+    """Return frequencies (x, y), phases and amplitudes of random plane waves."""
+    radius, angle = rng.uniform(low, high, count), rng.uniform(0, 2 * np.pi, count)
+    return (radius * np.cos(angle), radius * np.sin(angle), rng.uniform(0, 2 * np.pi, count),
+            rng.normal(size=count) * np.sqrt(2 / count))
+
+
+def _sum(waves, x, y):
+    """Return the sum of plane waves at points."""
+    total = np.zeros_like(x)
+    for fx, fy, phase, amplitude in zip(*waves, strict=True):
+        total += amplitude * np.cos(2 * np.pi * (fx * x + fy * y) + phase)
+    return total
+
+
+def _edge(distance, width):
+    """Return the part of each pixel that lies within width / 2 of the middle."""
+    return np.clip(width / 2 + 0.5 - np.abs(distance), 0, 1)
+
+
+@pytest.fixture(scope='session')
+def make_scene():
+    """Return the factory of scenes."""
+    return Scene
+
+
+@pytest.fixture(scope='session')
+def box_at():
+    """Return the box of a scene's target."""
+    return lambda center, target=(24.0, 18.0): BoundingBox.from_center(center, target)

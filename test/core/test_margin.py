@@ -1,0 +1,147 @@
+# Copyright 2026 lmsco_ros contributors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The margin loss against its definition on the grid of shifts."""
+
+from lmsco_ros.core.fourier.series import analyze, inner, synthesize
+from lmsco_ros.core.learning.margin import gaussian_label, make_margin_loss
+import numpy as np
+import pytest
+
+SIZE = 9
+ANCHORS = ('unit', 'coupled', 'frozen')
+
+
+@pytest.fixture
+def label():
+    return gaussian_label(SIZE, (0.12, 0.17))
+
+
+@pytest.fixture
+def scores(rng, label):
+    """Return series of scores on both sides of the label."""
+    return analyze(label[:, :, None] + 0.5 * rng.normal(size=(SIZE, SIZE, 4)))
+
+
+def margin_matrix(anchor):
+    """Return M on the flattened grid: s(0) - s, or s itself."""
+    identity = np.eye(SIZE**2)
+    if anchor != 'coupled':
+        return identity
+    origin = np.zeros_like(identity)
+    origin[:, 0] = 1
+    return origin - identity
+
+
+def targets(anchor, values, label, core=0.5):
+    """Return q on the flattened grid after the slack step, sample by sample."""
+    m, s = label.reshape(-1, 1), values.reshape(SIZE**2, -1)
+    if anchor == 'unit':
+        slack = np.where(m >= core, 0.0, np.maximum(0, m - s))
+        return m - slack
+    loss, difference = 1 - m, s[:1] - s
+    slack = np.maximum(0, difference - loss)
+    return loss + slack if anchor == 'coupled' else s[:1] - loss - slack
+
+
+def test_label_is_a_periodic_gaussian():
+    label = gaussian_label(41, (0.05, 0.08))
+    t = np.arange(41) / 41
+    axes = [sum(np.exp(-0.5 * ((t - p) / s)**2) for p in (-1, 0, 1, 2)) for s in (0.05, 0.08)]
+    np.testing.assert_allclose(label, axes[0][:, None] * axes[1][None, :], atol=1e-6)
+    assert label[0, 0] == 1 == label.max()
+
+
+def test_label_falls_off_as_its_sigma_says():
+    label = gaussian_label(51, (0.06, 0.1))
+    assert label[3, 0] == pytest.approx(np.exp(-0.5 * (3 / 51 / 0.06)**2), abs=1e-6)
+    assert label[0, 51 - 5] == pytest.approx(np.exp(-0.5 * (5 / 51 / 0.1)**2), abs=1e-6)
+
+
+@pytest.mark.parametrize('anchor', ANCHORS)
+def test_normal_operator_is_that_of_the_matrix(backend, label, scores, anchor):
+    loss = make_margin_loss(anchor, label, 0.5, backend)
+    matrix = margin_matrix(anchor)
+    values = synthesize(scores, SIZE).reshape(SIZE**2, -1)
+    expected = analyze((matrix.T @ matrix @ values).reshape(SIZE, SIZE, -1))
+    np.testing.assert_allclose(loss.normal(scores), expected, atol=1e-12)
+
+
+@pytest.mark.parametrize('anchor', ANCHORS)
+def test_normal_operator_is_self_adjoint(backend, rng, label, scores, anchor):
+    loss = make_margin_loss(anchor, label, 0.5, backend)
+    other = analyze(rng.normal(size=(SIZE, SIZE, 4)))
+    np.testing.assert_allclose(inner(loss.normal(scores), other),
+                               inner(scores, loss.normal(other)), rtol=1e-10)
+    assert np.all(inner(scores, loss.normal(scores)) >= 0)
+
+
+def test_coupling_has_one_eigenvalue_as_large_as_the_grid(backend, label):
+    loss = make_margin_loss('coupled', label, 0.5, backend)
+    ones = analyze(np.eye(1, SIZE**2).reshape(SIZE, SIZE, 1) * SIZE**2)
+    ones[SIZE // 2, 0] = 0
+    np.testing.assert_allclose(loss.normal(ones), SIZE**2 * ones, atol=1e-10)
+
+
+@pytest.mark.parametrize('anchor', ANCHORS)
+def test_targets_are_those_of_the_slack_step(backend, label, scores, anchor):
+    loss = make_margin_loss(anchor, label, 0.5, backend)
+    expected = margin_matrix(anchor).T @ targets(anchor, synthesize(scores, SIZE), label)
+    np.testing.assert_allclose(loss.slack_targets(scores),
+                               analyze(expected.reshape(SIZE, SIZE, -1)), atol=1e-12)
+
+
+@pytest.mark.parametrize('anchor', ANCHORS)
+def test_losses_are_squared_hinges(backend, label, scores, anchor):
+    loss = make_margin_loss(anchor, label, 0.5, backend)
+    s, m = synthesize(scores, SIZE), label[:, :, None]
+    if anchor == 'unit':
+        expected = np.where(m >= 0.5, (s - m)**2, np.maximum(0, s - m)**2)
+    else:
+        expected = np.maximum(0, (1 - m) - (s[:1, :1] - s))**2
+    np.testing.assert_allclose(loss.losses(scores), expected.mean(axis=(0, 1)), rtol=1e-12)
+
+
+@pytest.mark.parametrize('anchor', ['unit', 'coupled'])
+def test_slack_step_is_optimal(backend, label, scores, anchor):
+    # At the best slack, the squared distance of M s from its target is the hinge loss itself.
+    loss = make_margin_loss(anchor, label, 0.5, backend)
+    values = synthesize(scores, SIZE).reshape(SIZE**2, -1)
+    gap = margin_matrix(anchor) @ values - targets(anchor, values, label)
+    np.testing.assert_allclose(loss.losses(scores), (gap**2).mean(axis=0), rtol=1e-12)
+
+
+@pytest.mark.parametrize('anchor', ['unit', 'coupled'])
+def test_perfect_scores_cost_nothing(backend, label, anchor):
+    loss = make_margin_loss(anchor, label, 0.5, backend)
+    perfect = analyze(label[:, :, None])
+    assert loss.losses(perfect)[0] == pytest.approx(0, abs=1e-20)
+    np.testing.assert_allclose(loss.slack_targets(perfect), loss.normal(perfect), atol=1e-14)
+
+
+def test_wider_margins_cost_nothing(backend, label):
+    loss = make_margin_loss('coupled', label, 0.5, backend)
+    assert loss.losses(analyze(3 * label[:, :, None]))[0] == pytest.approx(0, abs=1e-20)
+
+
+def test_core_of_zero_is_ridge_regression(backend, label, scores):
+    loss = make_margin_loss('unit', np.maximum(label, 0), 0.0, backend)
+    s = synthesize(scores, SIZE)
+    expected = ((s - np.maximum(label, 0)[:, :, None])**2).mean(axis=(0, 1))
+    np.testing.assert_allclose(loss.losses(scores), expected, rtol=1e-12)
+
+
+def test_only_the_coupled_anchor_mixes_frequencies(backend, label):
+    mixes = [make_margin_loss(a, label, 0.5, backend).couples_frequencies for a in ANCHORS]
+    assert mixes == [False, True, False]
