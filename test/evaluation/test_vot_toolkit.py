@@ -26,6 +26,7 @@ import hashlib
 import json
 import os
 from pathlib import Path
+import shlex
 import shutil
 import subprocess
 import sys
@@ -158,7 +159,7 @@ def workspace(tmp_path_factory, environment):
     (folder / 'sequences' / 'list.txt').write_text('drift\njump\n')
     (folder / 'trackers.ini').write_text('\n'.join(
         f'[{name}]\nprotocol = trax\n'
-        f'command = {sys.executable} -m lmsco_ros.evaluation.trax --preset {preset}\n'
+        f'command = {shlex.quote(sys.executable)} -m lmsco_ros.evaluation.trax --preset {preset}\n'
         f'env_PYTHONPATH = {REPOSITORY}:{environment / "trax"}\n'
         for name, preset in (('lmsco', PRESET), ('broken', 'no_such_preset'))))
     stack = folder / 'stack.yaml'
