@@ -14,46 +14,57 @@
 
 
 """
-What the node adds to the tracker's own time, from the camera's publish to the box heard.
+What the node adds to the tracker's own time, at 640x512 mono16 and 30 Hz.
 
-A camera publishes 640x512 mono16 images at 30 Hz to the real node in the same process, and
-a listener notes when each box arrives; the tracker's own time, which ~/status tells, is
-subtracted. Prints the median and the 95th percentile of every repetition and the best.
+The node runs in a process of its own; this one plays camera and listener. Printed are the
+median and the 95th percentile, of every repetition and the best of each, of
 
-Run on an otherwise idle machine: python benchmarks/node_overhead.py [--frames N]
+- inside: from the arrival of the image in the node to the answer, less the tracker's time,
+  both as ~/status tells them;
+- end to end: from the camera's publish call to the box heard, less the tracker's time; this
+  holds both deliveries and what this process adds.
+
+With `real` the default tracker works, and frames that wait for it count; with `instant` the
+node is alone. Run on an otherwise idle machine, with the package on the path:
+python benchmarks/node_overhead.py [--frames N] [--repetitions N]
 """
 
 from __future__ import annotations
 
 import argparse
+from collections.abc import Iterator
+import contextlib
 import os
-import threading
+from pathlib import Path
+import signal
+import subprocess
+import sys
 import time
 
-os.environ.setdefault('ROS_AUTOMATIC_DISCOVERY_RANGE', 'LOCALHOST')
+from diagnostic_msgs.msg import DiagnosticArray
+from geometry_msgs.msg import PolygonStamped
+import numpy as np
+import rclpy
+from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
+from rclpy.node import Node
+from rclpy.qos import qos_profile_sensor_data
+from sensor_msgs.msg import Image, RegionOfInterest
 
-from diagnostic_msgs.msg import DiagnosticArray  # noqa: E402
-from geometry_msgs.msg import PolygonStamped  # noqa: E402
-import numpy as np  # noqa: E402
-from rclpy.context import Context  # noqa: E402
-from rclpy.executors import SingleThreadedExecutor  # noqa: E402
-from rclpy.node import Node  # noqa: E402
-from rclpy.parameter import Parameter  # noqa: E402
-from rclpy.qos import qos_profile_sensor_data  # noqa: E402
-from sensor_msgs.msg import Image, RegionOfInterest  # noqa: E402
+from lmsco_ros.core import BoundingBox, TrackResult, TrackState
+from lmsco_ros.node.tracker_factory import make_tracker
+from lmsco_ros.node.tracker_node import TrackerNode
+from msg_adapters.image import message_from_image
+from msg_adapters.status import FrameStatus, status_from_message
 
-from lmsco_ros.core import BoundingBox, TrackResult, TrackState  # noqa: E402
-from lmsco_ros.node.tracker_factory import make_tracker  # noqa: E402
-from lmsco_ros.node.tracker_node import TrackerNode  # noqa: E402
-from msg_adapters.image import message_from_image  # noqa: E402
-from msg_adapters.status import status_from_message  # noqa: E402
-
+PROFILE = Path(__file__).resolve().parents[1] / 'config' / 'fastdds_large_images.xml'
 SHAPE = (512, 640)
 BOX = (300, 240, 40, 30)
+# The first second holds the starts, whose frames came before.
+WARM_UP = 30
 
 
 class InstantTracker:
-    """Answers at once: what remains is the node alone."""
+    """Answers at once: what remains is the node."""
 
     def initialize(self, image: np.ndarray, box: BoundingBox) -> TrackResult:
         """Return the box."""
@@ -66,16 +77,18 @@ class InstantTracker:
                            np.zeros((2, 2), np.float32), self._box)
 
 
-class Camera(Node):
-    """Sends images at a fixed rate, and notes when each was sent, tracked and answered."""
+TRACKERS = {'real': make_tracker, 'instant': lambda settings: InstantTracker()}
 
-    def __init__(self, context: Context, frames: int) -> None:
-        super().__init__('camera', context=context)
+
+class Camera(Node):
+    """Sends images at a fixed rate, and notes when each was sent and answered."""
+
+    def __init__(self, frames: int) -> None:
+        super().__init__('camera')
         self.sent: dict[int, float] = {}
         self.heard: dict[int, float] = {}
-        self.tracker_seconds: dict[int, float] = {}
-        self.finished = threading.Event()
-        self._remaining = frames
+        self.statuses: dict[int, FrameStatus] = {}
+        self.remaining = frames + WARM_UP
         self._image = message_from_image(_scene())
         self._images = self.create_publisher(Image, 'image_raw', qos_profile_sensor_data)
         self._init = self.create_publisher(RegionOfInterest, 'init_box', 1)
@@ -84,14 +97,11 @@ class Camera(Node):
         self.create_timer(1 / 30, self._on_timer)
 
     def _on_timer(self) -> None:
-        if not self.heard and self._init.get_subscription_count():
+        if not self.heard:
             x, y, width, height = BOX
             self._init.publish(RegionOfInterest(x_offset=x, y_offset=y, width=width,
                                                 height=height))
-        self._remaining -= bool(self.heard)
-        if self._remaining < 0:
-            self.finished.set()
-            return
+        self.remaining -= bool(self.heard)
         stamp = self.get_clock().now()
         self._image.header.stamp = stamp.to_msg()
         self.sent[stamp.nanoseconds] = time.monotonic()
@@ -101,15 +111,15 @@ class Camera(Node):
         self.heard[_nanoseconds(message)] = time.monotonic()
 
     def _on_status(self, message: DiagnosticArray) -> None:
-        status = status_from_message(message)
-        self.tracker_seconds[_nanoseconds(message)] = status.tracker_ms / 1e3
+        self.statuses[_nanoseconds(message)] = status_from_message(message)
 
-    def overheads(self) -> np.ndarray:
-        """Return milliseconds from sending to hearing, less the tracker's, per frame."""
-        # The first second holds the starts, which come after their frames.
-        stamps = sorted(self.heard.keys() & self.tracker_seconds.keys())[30:]
-        return 1e3 * np.array([self.heard[s] - self.sent[s] - self.tracker_seconds[s]
-                               for s in stamps])
+    def figures(self) -> np.ndarray:
+        """Return milliseconds (inside, end to end, tracker), one row for each answered frame."""
+        stamps = sorted(self.heard.keys() & self.statuses.keys())[WARM_UP:]
+        return np.array([(
+            self.statuses[s].latency_ms - self.statuses[s].tracker_ms,
+            1e3 * (self.heard[s] - self.sent[s]) - self.statuses[s].tracker_ms,
+            self.statuses[s].tracker_ms) for s in stamps])
 
 
 def _nanoseconds(message: PolygonStamped | DiagnosticArray) -> int:
@@ -127,43 +137,67 @@ def _scene() -> np.ndarray:
             + noise).astype(np.uint16)
 
 
-def measure(frames: int, instant: bool) -> tuple[np.ndarray, float, int]:
-    """Run once; return the overheads, the tracker's median and the number of lost frames."""
-    context = Context()
-    context.init()
-    node = TrackerNode(
-        context=context, tracker_factory=lambda settings: InstantTracker() if instant
-        else make_tracker(settings), parameter_overrides=[Parameter('image_depth', value=5)])
-    camera = Camera(context, frames)
-    executors = [SingleThreadedExecutor(context=context) for _ in range(2)]
-    for executor, member in zip(executors, (node, camera)):
-        executor.add_node(member)
-        threading.Thread(target=executor.spin, daemon=True).start()
-    camera.finished.wait()
-    for executor, member in zip(executors, (node, camera)):
-        executor.shutdown()
-        member.destroy_node()
-    context.try_shutdown()
-    tracker = 1e3 * float(np.median(list(camera.tracker_seconds.values())))
-    return camera.overheads(), tracker, len(camera.sent) - len(camera.heard)
+def run_node(tracker: str) -> None:
+    """Be the node's process."""
+    rclpy.init()
+    node = TrackerNode(tracker_factory=TRACKERS[tracker])
+    executor = SingleThreadedExecutor()
+    executor.add_node(node)
+    with contextlib.suppress(KeyboardInterrupt, ExternalShutdownException):
+        executor.spin()
+    node.destroy_node()
+    rclpy.try_shutdown()
+
+
+@contextlib.contextmanager
+def node_process(tracker: str) -> Iterator[None]:
+    """Run the node beside this process."""
+    process = subprocess.Popen([sys.executable, __file__, '--node', tracker],
+                               stderr=subprocess.DEVNULL)
+    try:
+        yield
+    finally:
+        process.send_signal(signal.SIGINT)
+        process.wait()
+
+
+def measure(tracker: str, frames: int) -> np.ndarray:
+    """Run once and return the figures of every answered frame."""
+    camera = Camera(frames)
+    with node_process(tracker):
+        while camera.remaining > 0:
+            rclpy.spin_once(camera)
+    camera.destroy_node()
+    return camera.figures()
 
 
 def main() -> None:
-    """Measure with the real and with an instant tracker, and print the figures."""
+    """Measure and print."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[1])
     parser.add_argument('--frames', type=int, default=300)
     parser.add_argument('--repetitions', type=int, default=3)
+    parser.add_argument('--node', choices=TRACKERS, help='be the node (used internally)')
     options = parser.parse_args()
-    for name, instant in (('real tracker', False), ('instant tracker', True)):
+    os.environ.setdefault('ROS_AUTOMATIC_DISCOVERY_RANGE', 'LOCALHOST')
+    if options.node:
+        run_node(options.node)
+        return
+    os.environ.setdefault('FASTRTPS_DEFAULT_PROFILES_FILE', str(PROFILE))
+    rclpy.init()
+    for tracker in TRACKERS:
         rows = []
         for _ in range(options.repetitions):
-            overheads, tracker, unanswered = measure(options.frames, instant)
-            rows.append(np.percentile(overheads, [50, 95]))
-            print(f'{name}: tracker {tracker:.1f} ms, overhead p50 {rows[-1][0]:.2f} ms, '
-                  f'p95 {rows[-1][1]:.2f} ms, {len(overheads)} frames, '
-                  f'{unanswered} unanswered', flush=True)
-        p50, p95 = np.min(rows, axis=0)
-        print(f'{name}: best p50 {p50:.2f} ms, best p95 {p95:.2f} ms')
+            figures = measure(tracker, options.frames)
+            rows.append(np.percentile(figures, [50, 95], axis=0)[:, :2].T.ravel())
+            print(f'{tracker}: {_sentence(rows[-1])}; tracker {np.median(figures[:, 2]):.1f} ms, '
+                  f'{len(figures)} of {options.frames} frames', flush=True)
+        print(f'{tracker}, best of {options.repetitions}: {_sentence(np.min(rows, axis=0))}')
+    rclpy.shutdown()
+
+
+def _sentence(values: np.ndarray) -> str:
+    return ('inside p50 {:.2f} p95 {:.2f} ms, end to end p50 {:.2f} p95 {:.2f} ms'
+            .format(*values))
 
 
 if __name__ == '__main__':

@@ -107,6 +107,7 @@ class HealthMonitor:
         with self._lock:
             self._counts['refused'] += 1
             self._last_error = reason
+            self._state = Phase.REFUSED.value
 
     def answered(self, outcome: Outcome) -> None:
         """Note what became of a frame."""
@@ -146,6 +147,8 @@ class HealthMonitor:
             values |= {'dropped_frames': str(dropped_frames),
                        'latency_p50_ms': f'{p50:.2f}', 'latency_p95_ms': f'{p95:.2f}',
                        'last_error': self._last_error}
+        if values['state'] == Phase.REFUSED.value:
+            return Diagnosis(name, Level.ERROR, warning or values['last_error'], values)
         level = Level.WARN if warning else Level.OK
         return Diagnosis(name, level, warning or values['state'], values)
 

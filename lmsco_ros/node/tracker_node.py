@@ -99,7 +99,11 @@ class TrackerNode(LifecycleNode):
         self._served = []
         self._health_timer = None
         self._health_publisher = None
-        self.settings = parameters.declare(self)
+        try:
+            self.settings = parameters.declare(self)
+        except ParameterException:
+            super().destroy_node()
+            raise
         self.add_on_set_parameters_callback(self._judge_change)
         self.add_post_set_parameters_callback(self._apply_change)
         if self.settings.autostart:

@@ -24,6 +24,8 @@ import threading
 
 import pytest
 
+from lmsco_ros.node.tracker_node import main
+
 REPOSITORY = Path(__file__).resolve().parents[2]
 # Generous for a machine under load; the node itself aims at one second.
 PATIENCE = 10.0
@@ -66,9 +68,7 @@ def test_signal_ends_the_process_cleanly(number):
     (['-p', 'preset:=best'], 'default'),
     (['-p', 'threads:=many'], 'threads'),
 ])
-def test_wrong_parameters_end_the_process_with_a_reason(arguments, word):
-    done = subprocess.run(
-        [sys.executable, '-m', 'lmsco_ros.node.tracker_node', '--ros-args', *arguments],
-        cwd=REPOSITORY, capture_output=True, text=True, timeout=60)
-    assert done.returncode == 1
-    assert word in done.stderr and 'Traceback' not in done.stderr
+def test_wrong_parameters_end_main_with_a_reason(capfd, arguments, word):
+    assert main(['--ros-args', *arguments]) == 1
+    errors = capfd.readouterr().err
+    assert word in errors and 'Traceback' not in errors

@@ -15,6 +15,8 @@
 
 """Every row of the node's table of topics and services, over real ROS messages."""
 
+from unittest.mock import Mock
+
 from diagnostic_msgs.msg import DiagnosticArray
 import numpy as np
 import pytest
@@ -256,6 +258,26 @@ def test_marker_outlines_the_box_and_goes_away_with_it(running):
     assert box_from_marker(markers[0]) == (10, 12, 8, 6)
     assert box_from_marker(markers[1]) is None
     assert (markers[0].ns, markers[0].id) == (markers[1].ns, markers[1].id)
+
+
+def test_detections_are_empty_without_a_box(run, monkeypatch):
+    detections = []
+    listener = Mock(publish=detections.append, get_subscription_count=lambda: 1)
+    monkeypatch.setattr('lmsco_ros.node.outputs.Outputs._detections_publisher',
+                        lambda self: listener)
+    monkeypatch.setattr('lmsco_ros.node.outputs.detections_from_box',
+                        lambda box, **values: (box, values))
+    running = run()
+    running.send()
+    running.start(10, 12, 8, 6)
+    running.graph.spin_until(lambda: len(running.statuses) == 2)
+    running.fake.states = [TrackState.UNCERTAIN, TrackState.LOST]
+    images = [running.graph.image(), running.graph.image()]
+    running.send(*images)
+    running.graph.spin_until(lambda: len(detections) == 4)
+    assert [box for box, _ in detections] == [
+        None, (10, 12, 8, 6), (11, 12, 8, 6), None]
+    assert detections[2][1] == {'track_id': '1', 'score': 0.75, 'header': images[0].header}
 
 
 @pytest.mark.skipif(not detections_available(), reason='vision_msgs is not installed')

@@ -1,0 +1,123 @@
+# Copyright 2026 lmsco_ros contributors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""Health figures are computed from what happened, on a clock that the test moves."""
+
+import numpy as np
+import pytest
+
+from lmsco_ros.core.types import BoundingBox, TrackResult, TrackState
+from lmsco_ros.node.diagnostics import (frame_status, HealthMonitor, refused_status,
+                                        silence_warning)
+from lmsco_ros.node.worker import Frame, Outcome, Phase
+from msg_adapters.status import Level
+
+BOX = BoundingBox(1, 2, 3, 4)
+
+
+class Clock:
+    """Time that stands still until it is moved."""
+
+    now = 100.0
+
+    def __call__(self) -> float:
+        return self.now
+
+
+def outcome(phase=Phase.TRACKED, state=TrackState.TRACKING, *, latency=0.01, live=True,
+            error=''):
+    result = TrackResult(BOX, 0.5, state, np.zeros((2, 2), np.float32), BOX) \
+        if phase is Phase.TRACKED else None
+    frame = Frame(np.zeros((2, 2)), 0, 0.0)
+    return Outcome(frame, phase, result, 3, live, error, 0.004, latency)
+
+
+def report(monitor, **values):
+    return monitor.report('node', **{'warning': '', 'dropped_frames': 0, **values})
+
+
+def test_rate_and_silence_follow_the_clock():
+    clock = Clock()
+    monitor = HealthMonitor(clock)
+    for number in range(61):
+        clock.now += 1 / 30
+        monitor.received(number)
+    assert float(report(monitor).values['image_rate_hz']) == pytest.approx(30, abs=0.1)
+    clock.now += 7
+    assert monitor.silence() == pytest.approx(7)
+    assert report(monitor).values['image_rate_hz'] == '0.0'
+    monitor.restart()
+    assert monitor.silence() == 0
+
+
+def test_latency_counts_live_frames_only():
+    monitor = HealthMonitor()
+    for latency in (0.010, 0.020, 0.030):
+        monitor.answered(outcome(latency=latency))
+    monitor.answered(outcome(latency=9.0, live=False))
+    values = report(monitor).values
+    assert (values['latency_p50_ms'], values['tracked']) == ('20.00', '4')
+    assert float(values['latency_p95_ms']) == pytest.approx(29)
+
+
+def test_backward_stamps_are_noticed():
+    monitor = HealthMonitor()
+    assert [monitor.received(stamp) for stamp in (5, 6, 6, 2, 3)] == [
+        False, False, False, True, False]
+    assert report(monitor).values['backward_stamps'] == '1'
+
+
+def test_level_and_message_tell_what_is_wrong():
+    monitor = HealthMonitor()
+    assert report(monitor).level == Level.OK
+    monitor.answered(outcome(state=TrackState.LOST))
+    assert (report(monitor).level, report(monitor).message) == (Level.OK, 'lost')
+    assert report(monitor, warning='no image').level == Level.WARN
+    monitor.refused('what encoding is this')
+    assert report(monitor).level == Level.ERROR
+    assert report(monitor).message == 'what encoding is this'
+    monitor.answered(outcome())
+    assert report(monitor).level == Level.OK
+    assert report(monitor).values['last_error'] == 'what encoding is this'
+
+
+@pytest.mark.parametrize('given, state, level', [
+    (outcome(), 'tracking', Level.OK),
+    (outcome(state=TrackState.UNCERTAIN), 'uncertain', Level.WARN),
+    (outcome(state=TrackState.LOST), 'lost', Level.WARN),
+    (outcome(Phase.IDLE), 'idle', Level.OK),
+    (outcome(Phase.DISABLED), 'disabled', Level.OK),
+    (outcome(Phase.REFUSED, error='why'), 'refused', Level.ERROR),
+    (outcome(Phase.FAILED, error='why'), 'failed', Level.ERROR),
+])
+def test_frame_status_tells_state_and_figures(given, state, level):
+    status = frame_status(given, 7)
+    assert (status.state, status.level, status.track_id, status.dropped_frames) == (
+        state, level, 3, 7)
+    assert (status.latency_ms, status.tracker_ms) == (10, 4)
+    assert status.score == (0.5 if given.result else None)
+    assert status.message and (not given.error or status.message == 'why')
+
+
+def test_refused_status_carries_the_reason():
+    status = refused_status('why', 2, 1)
+    assert (status.state, status.message, status.track_id) == ('refused', 'why', 2)
+
+
+@pytest.mark.parametrize('publishers, advice', [(0, 'remap image_raw'), (2, 'image_reliability')])
+def test_silence_is_explained(publishers, advice):
+    warning = silence_warning(4.2, '/image_raw', publishers)
+    assert warning.startswith('no image for 4 s on /image_raw: check topic name and QoS')
+    assert advice in warning
