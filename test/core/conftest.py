@@ -22,10 +22,11 @@ code with the half spectra of the tracker.
 from types import SimpleNamespace
 
 import array_api_compat.numpy as numpy_namespace
-from lmsco_ros.core import BoundingBox
-from lmsco_ros.core.backend import Backend
 import numpy as np
 import pytest
+
+from lmsco_ros.core import BoundingBox
+from lmsco_ros.core.backend import Backend
 
 
 @pytest.fixture
@@ -50,6 +51,7 @@ class Band:
         Bandwidth K.
     size : int
         Points per axis.
+
     """
 
     def __init__(self, order, size):
@@ -170,6 +172,7 @@ def dense_problem(blocks, weights, gamma, margin_weight):
     namespace
         `scores` (n, N^2, d): filter coordinates to scores; `penalty` (d, d): G^T G; `pack` and
         `unpack`: half spectra to coordinates and back.
+
     """
     size = blocks[0][0].size
     fine = gamma.shape[0]
@@ -236,6 +239,7 @@ class Scene:
         Width and height in pixels.
     seed : int
         Seed of the textures.
+
     """
 
     def __init__(self, size=(160, 128), seed=3):

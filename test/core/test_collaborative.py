@@ -14,6 +14,9 @@
 
 """Training against a dense problem that is assembled from its definition on the grid."""
 
+import numpy as np
+import pytest
+
 from lmsco_ros.core.config import LearningConfig
 from lmsco_ros.core.fourier.series import analyze, inner
 from lmsco_ros.core.learning.collaborative import CollaborativeOptimizer
@@ -21,8 +24,6 @@ from lmsco_ros.core.learning.margin import gaussian_label, make_margin_loss
 from lmsco_ros.core.learning.memory import SampleMemory
 from lmsco_ros.core.learning.regularization import SpatialWindow, window_series
 from lmsco_ros.core.learning.structured_operator import StructuredOperator
-import numpy as np
-import pytest
 
 SIZE = 9
 TARGET = (0.3, 0.4)
@@ -165,18 +166,18 @@ def test_converged_gradient_steps_agree_with_the_dense_solve(make, anchor):
     training = make(anchor)
     coordinates = np.zeros(len(training.dense.penalty))
     for _ in range(3):
-        training.optimizer.optimize(1, 400)
+        training.optimizer.optimize(1, 150)
         coordinates = np.linalg.solve(training.matrix(), training.right_hand_side(coordinates))
         np.testing.assert_allclose(training.dense.pack(training.optimizer.filters), coordinates,
                                    atol=1e-4 * np.abs(coordinates).max())
 
 
 @pytest.mark.parametrize('anchor', ['unit', 'coupled'])
-@pytest.mark.parametrize('steps', [1, 2, 60])
+@pytest.mark.parametrize('steps', [1, 2, 40])
 def test_objective_never_grows(make, anchor, steps):
     training = make(anchor)
     values = [training.optimizer.objective()]
-    for _ in range(40):
+    for _ in range(15):
         training.optimizer.optimize(1, steps)
         values.append(training.optimizer.objective())
     assert np.all(np.diff(values) <= 1e-9 * values[0])
@@ -186,17 +187,17 @@ def test_objective_never_grows(make, anchor, steps):
 def test_frozen_anchor_is_not_monotone(make):
     training = make('frozen')
     values = []
-    for _ in range(40):
-        training.optimizer.optimize(1, 60)
+    for _ in range(12):
+        training.optimizer.optimize(1, 40)
         values.append(training.optimizer.objective())
     assert max(np.diff(values)) > 0
-    assert values[-1] > 1.05 * min(values)
+    assert values[-1] > 3 * values[0]
 
 
 @pytest.mark.parametrize('anchor', ['unit', 'coupled'])
 def test_many_iterations_reach_the_minimum_of_the_dense_problem(make, anchor):
     training = make(anchor)
-    training.optimizer.optimize(150, 5)
+    training.optimizer.optimize(100, 5)
     reached = training.dense.pack(training.optimizer.filters)
     gradient = training.matrix() @ reached - training.right_hand_side(reached)
     scale = np.linalg.norm(training.right_hand_side(0 * reached))
@@ -205,7 +206,7 @@ def test_many_iterations_reach_the_minimum_of_the_dense_problem(make, anchor):
 
 def test_core_of_zero_is_dense_ridge_regression(make):
     training = make('unit', core=0.0)
-    training.optimizer.optimize(1, 400)
+    training.optimizer.optimize(1, 150)
     rows = training.dense.scores.reshape(-1, training.dense.scores.shape[2])
     weights = np.repeat(training.dense.weights, SIZE**2) / SIZE**2
     normal = training.dense.penalty + MARGIN_WEIGHT * rows.T @ (weights[:, None] * rows)

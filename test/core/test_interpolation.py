@@ -14,10 +14,11 @@
 
 """Interpolated channels against the cubic spline itself."""
 
-from lmsco_ros.core.fourier import interpolation
-from lmsco_ros.core.fourier.series import analyze
 import numpy as np
 import pytest
+
+from lmsco_ros.core.fourier import interpolation
+from lmsco_ros.core.fourier.series import analyze
 
 
 def keys_kernel(x, a=-0.75):

@@ -15,10 +15,11 @@
 """The refined maximum against fine grids."""
 
 from hypothesis import given, strategies as st
-from lmsco_ros.core.fourier.localization import centered_map, locate, refine
-from lmsco_ros.core.fourier.series import analyze, synthesize
 import numpy as np
 import pytest
+
+from lmsco_ros.core.fourier.localization import centered_map, locate, refine
+from lmsco_ros.core.fourier.series import analyze, synthesize
 
 
 def bump(size, center, sharpness=6.0, height=1.0):

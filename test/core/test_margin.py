@@ -14,10 +14,11 @@
 
 """The margin loss against its definition on the grid of shifts."""
 
-from lmsco_ros.core.fourier.series import analyze, inner, synthesize
-from lmsco_ros.core.learning.margin import gaussian_label, make_margin_loss
 import numpy as np
 import pytest
+
+from lmsco_ros.core.fourier.series import analyze, inner, synthesize
+from lmsco_ros.core.learning.margin import gaussian_label, make_margin_loss
 
 SIZE = 9
 ANCHORS = ('unit', 'coupled', 'frozen')

@@ -15,10 +15,11 @@
 """Sample memory: weights, and the score operator against sums in space."""
 
 from hypothesis import given, strategies as st
-from lmsco_ros.core.fourier.series import analyze, inner, synthesize
-from lmsco_ros.core.learning.memory import PriorWeights, SampleMemory, score
 import numpy as np
 import pytest
+
+from lmsco_ros.core.fourier.series import analyze, inner, synthesize
+from lmsco_ros.core.learning.memory import PriorWeights, SampleMemory, score
 
 SHAPES = [(9, 5, 2), (5, 3, 3)]
 

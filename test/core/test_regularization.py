@@ -14,10 +14,11 @@
 
 """The spatial window against multiplication on a fine grid."""
 
-from lmsco_ros.core.fourier.series import analyze, inner, synthesize
-from lmsco_ros.core.learning.regularization import SpatialWindow, window_series
 import numpy as np
 import pytest
+
+from lmsco_ros.core.fourier.series import analyze, inner, synthesize
+from lmsco_ros.core.learning.regularization import SpatialWindow, window_series
 
 CCOT = (1e-4, 10e-3, 0.05)
 CASES = [

@@ -15,9 +15,10 @@
 """Half spectra against functions on grids and sums over whole spectra."""
 
 from hypothesis import given, strategies as st
-from lmsco_ros.core.fourier import series as fs
 import numpy as np
 import pytest
+
+from lmsco_ros.core.fourier import series as fs
 
 SEEDS = st.integers(0, 2**32 - 1)
 

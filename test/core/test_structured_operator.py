@@ -1,0 +1,121 @@
+# Copyright 2026 lmsco_ros contributors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Filters of several blocks: joint or one by one, first frame and later ones."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from lmsco_ros.core.config import LearningConfig
+from lmsco_ros.core.fourier.series import analyze, synthesize
+from lmsco_ros.core.learning.structured_operator import StructuredOperator
+
+TARGET = (0.25, 0.3)
+CONFIG = LearningConfig(
+    anchor='unit', solve='joint', core=0.5, margin_weight=1.0, label_sigma=0.25,
+    window_minimum=0.03, window_edge=0.05, memory_size=4, learning_rate=0.1,
+    initial_iterations=15, iterations=4, gradient_steps=2)
+
+
+def make_sample(rng):
+    """Return two blocks of unequal resolution."""
+    return [analyze(rng.normal(size=(11, 11, 3))), analyze(rng.normal(size=(7, 7, 2)))]
+
+
+def score_map(operator, sample):
+    """Return the scores of one sample on a grid."""
+    return synthesize(operator.scores([block[:, :, None, :] for block in sample]), 11)[:, :, 0]
+
+
+@pytest.mark.parametrize('anchor', ['unit', 'coupled'])
+@pytest.mark.parametrize('solve', ['joint', 'per_block'])
+def test_target_scores_highest_at_the_origin(backend, rng, anchor, solve):
+    sample = make_sample(rng)
+    operator = StructuredOperator(replace(CONFIG, anchor=anchor, solve=solve), sample, TARGET,
+                                  backend)
+    scores = score_map(operator, sample)
+    assert np.argmax(scores) == 0
+    assert scores[0, 0] > 2 * np.abs(scores[4:7, 4:7]).max()
+
+
+def test_per_block_is_one_problem_for_each_block(backend, rng):
+    sample, later = make_sample(rng), make_sample(rng)
+    both = StructuredOperator(replace(CONFIG, solve='per_block'), sample, TARGET, backend)
+    alone = [StructuredOperator(CONFIG, [block], TARGET, backend) for block in sample]
+    for operator, blocks in [(both, later), *zip(alone, ([b] for b in later), strict=True)]:
+        operator.remember(blocks)
+        operator.train()
+    for block, single in zip(both.filters, alone, strict=True):
+        np.testing.assert_array_equal(block, single.filters[0])
+    assert both.objective() == pytest.approx(sum(single.objective() for single in alone))
+
+
+def test_one_block_is_the_same_problem_either_way(backend, rng):
+    sample = make_sample(rng)[:1]
+    joint, single = (StructuredOperator(replace(CONFIG, solve=solve), sample, TARGET, backend)
+                     for solve in ('joint', 'per_block'))
+    np.testing.assert_array_equal(joint.filters[0], single.filters[0])
+
+
+def test_joint_filters_fit_together(backend, rng):
+    # Each of the blocks alone reaches for the whole label; together they overshoot it.
+    sample = make_sample(rng)
+    config = replace(CONFIG, margin_weight=20.0)
+    joint, single = (StructuredOperator(replace(config, solve=solve), sample, TARGET, backend)
+                     for solve in ('joint', 'per_block'))
+    assert abs(score_map(joint, sample)[0, 0] - 1) < 0.15
+    assert score_map(single, sample)[0, 0] > 1.5
+
+
+def test_training_takes_in_what_was_remembered(backend, rng):
+    first, second = make_sample(rng), make_sample(rng)
+    operator = StructuredOperator(CONFIG, first, TARGET, backend)
+    before = [block.copy() for block in operator.filters]
+    operator.remember(second)
+    for block, old in zip(operator.filters, before, strict=True):
+        np.testing.assert_array_equal(block, old)
+    unseen = score_map(operator, second)[0, 0]
+    for _ in range(5):
+        operator.train()
+    assert abs(score_map(operator, second)[0, 0] - 1) < 0.5 * abs(unseen - 1)
+
+
+def test_training_lowers_the_objective(backend, rng):
+    operator = StructuredOperator(CONFIG, make_sample(rng), TARGET, backend)
+    for _ in range(6):
+        operator.remember(make_sample(rng))
+        before = operator.objective()
+        operator.train()
+        assert operator.objective() < before
+
+
+def test_samples_are_not_changed(backend, rng):
+    sample, later = make_sample(rng), make_sample(rng)
+    kept = [block.copy() for block in [*sample, *later]]
+    operator = StructuredOperator(CONFIG, sample, TARGET, backend)
+    operator.remember(later)
+    operator.train()
+    for block, before in zip([*sample, *later], kept, strict=True):
+        np.testing.assert_array_equal(block, before)
+
+
+def test_scores_of_several_samples(backend, rng):
+    samples = [make_sample(rng) for _ in range(3)]
+    operator = StructuredOperator(CONFIG, samples[0], TARGET, backend)
+    stacked = [np.stack(blocks, axis=2) for blocks in zip(*samples, strict=True)]
+    scores = synthesize(operator.scores(stacked), 11)
+    for j, sample in enumerate(samples):
+        np.testing.assert_allclose(scores[:, :, j], score_map(operator, sample), atol=1e-12)
