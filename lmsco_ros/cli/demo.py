@@ -27,6 +27,7 @@ from rich.progress import Progress
 from rich.table import Table
 import typer
 
+from lmsco_ros.cli.configuration import load_config
 from lmsco_ros.cli.console import fail, FAILED, frame_progress, plain_errors, say
 from lmsco_ros.cli.options import PresetOption
 from lmsco_ros.cli.ros import require_ros
@@ -57,6 +58,7 @@ def demo(
     """Render a thermal scene, track in it with the node, and compare with the truth."""
     with plain_errors():
         require_ros()
+        load_config(preset)
         from lmsco_ros.replay.scene_run import run_scene
         from lmsco_ros.synthetic import SceneConfig
 

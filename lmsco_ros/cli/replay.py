@@ -21,9 +21,11 @@ from typing import Annotated, Optional
 
 import typer
 
+from lmsco_ros.cli.configuration import load_config
 from lmsco_ros.cli.console import frame_progress, plain_errors, say, warn
 from lmsco_ros.cli.options import (
     BagArgument, ConfigOption, FramesOption, InitOption, PresetOption, TopicOption)
+from lmsco_ros.cli.ros import require_ros
 from lmsco_ros.replay.storage import Storage
 
 
@@ -51,8 +53,8 @@ def replay(
 ) -> None:
     """Play a bag through the node and record its answers beside the messages of the bag."""
     with plain_errors():
-        from lmsco_ros.cli.ros import require_ros
         require_ros()
+        load_config(preset, config)
         from lmsco_ros.core import BoundingBox
         from lmsco_ros.replay.bag_replay import replay_bag, ReplayPlan
 

@@ -24,6 +24,7 @@ from typing import Annotated, Optional, TYPE_CHECKING
 
 import typer
 
+from lmsco_ros.cli.configuration import load_config
 from lmsco_ros.cli.console import fail, FAILED, frame_progress, MISUSED, plain_errors, say, warn
 from lmsco_ros.cli.options import (
     Box, ConfigOption, FramesOption, parse_box, PresetOption, SourceArgument, TopicOption)
@@ -60,15 +61,15 @@ def track(
     if init is None and ground_truth is None:
         fail('no target; give --init x,y,w,h, or a --ground-truth that starts with it', MISUSED)
     with plain_errors():
-        from lmsco_ros.core import LMSCOTracker, TrackerConfig
+        from lmsco_ros.core import LMSCOTracker
         from lmsco_ros.replay.sources import open_source
 
+        tracker = LMSCOTracker(load_config(preset, config))
         images = open_source(source, topic=topic)
         truth = _read_truth(ground_truth)
         start = _start_box(init, truth)
-        settings = TrackerConfig.from_yaml(config) if config else TrackerConfig.preset(preset)
         folder = output or Path('output') / source.resolve().stem
-        _run(LMSCOTracker(settings), images, start, truth, folder,
+        _run(tracker, images, start, truth, folder,
              title=f'{_title(source)}  ·  {config.stem if config else preset}', limit=frames)
 
 

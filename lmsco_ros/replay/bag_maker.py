@@ -19,6 +19,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
+import shutil
 import sys
 
 import numpy as np
@@ -39,7 +40,7 @@ _ENCODINGS = {(np.dtype(np.uint8), 2): 'mono8', (np.dtype(np.uint16), 2): 'mono1
 @contextmanager
 def create_bag(path: Path, storage: Storage) -> Iterator[Writer]:
     """
-    Create a bag that does not exist yet, and finish it whatever happens.
+    Create a bag that does not exist yet; it is finished also when the user interrupts.
 
     Raises
     ------
@@ -48,8 +49,7 @@ def create_bag(path: Path, storage: Storage) -> Iterator[Writer]:
 
     """
     plugin = {Storage.MCAP: StoragePlugin.MCAP, Storage.SQLITE3: StoragePlugin.SQLITE3}[storage]
-    if path.exists():
-        raise OutputError(f'{path} exists; choose another output, or remove it')
+    require_free(path)
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         writer = Writer(path, version=9, storage_plugin=plugin)
@@ -59,8 +59,29 @@ def create_bag(path: Path, storage: Storage) -> Iterator[Writer]:
                           'choose a place that can be written to') from error
     try:
         yield writer
-    finally:
+    except Exception:
+        # Half a bag is no use, and would stand in the way of the next try.
         writer.close()
+        shutil.rmtree(path)
+        raise
+    except BaseException:
+        writer.close()
+        raise
+    writer.close()
+
+
+def require_free(path: Path) -> None:
+    """
+    Check that a new bag can be called `path`.
+
+    Raises
+    ------
+    OutputError
+        When there is something already.
+
+    """
+    if path.exists():
+        raise OutputError(f'{path} exists; choose another output, or remove it')
 
 
 def make_bag(frames: Iterable[Frame], path: Path, *, topic: str, frame_id: str,

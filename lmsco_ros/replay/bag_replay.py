@@ -30,7 +30,7 @@ from rosbags.typesys import get_typestore, Stores
 from lmsco_ros.core.types import BoundingBox
 from lmsco_ros.replay.bag_images import (
     choose_connection, COMPRESSED, open_bag, serialized_stamp)
-from lmsco_ros.replay.bag_maker import create_bag
+from lmsco_ros.replay.bag_maker import create_bag, require_free
 from lmsco_ros.replay.errors import SourceError
 from lmsco_ros.replay.node_session import Heard, NODE_NAME, NodeSession, OUTPUTS
 from lmsco_ros.replay.player import Exchange, Player
@@ -103,6 +103,7 @@ def replay_bag(plan: ReplayPlan, on_begin: Callable[[int], None],
         When the bag cannot be read or written, or the node refuses.
 
     """
+    require_free(plan.output)
     with open_bag(plan.bag) as reader:
         images = choose_connection(reader, plan.bag, plan.topic)
         if not images.msgcount:

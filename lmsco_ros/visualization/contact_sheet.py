@@ -25,6 +25,7 @@ import cv2
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
+from matplotlib.image import AxesImage
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch, Rectangle
 import numpy as np
@@ -35,6 +36,7 @@ from lmsco_ros.visualization.overlay import state_color
 
 _COLUMNS = 6
 _TRUTH = '#ffffff'
+_LEAST_CONTRAST = 40
 _INK, _MUTED, _PAPER = '#1f2933', '#7b8794', '#ffffff'
 
 
@@ -201,11 +203,17 @@ def _draw_frame(axes: Axes, moment: Moment) -> None:
 
 
 def _draw_close_up(axes: Axes, moment: Moment) -> None:
-    """Draw the part of the image in which the target was searched."""
+    """Draw the part of the image in which the target was searched, in its own contrast."""
     height, width = moment.view.shape[:2]
-    _show(axes, moment.view, (0, width, height, 0))
+    region = moment.result.search_region
+    part = moment.view[max(0, int(region.y)):max(0, int(region.y + region.height)),
+                       max(0, int(region.x)):max(0, int(region.x + region.width))]
+    picture = _show(axes, moment.view, (0, width, height, 0))
+    if part.size:
+        low, high = np.percentile(part, (1, 99.8))
+        picture.set_clim(low, max(high, low + _LEAST_CONTRAST))
     _draw_boxes(axes, moment)
-    _frame_region(axes, moment.result.search_region)
+    _frame_region(axes, region)
 
 
 def _draw_confidence(axes: Axes, moment: Moment) -> None:
@@ -221,9 +229,9 @@ def _draw_confidence(axes: Axes, moment: Moment) -> None:
 
 
 def _show(axes: Axes, view: npt.NDArray[np.uint8],
-          extent: tuple[float, float, float, float]) -> None:
+          extent: tuple[float, float, float, float]) -> AxesImage:
     picture = cv2.cvtColor(view, cv2.COLOR_BGR2RGB) if view.ndim == 3 else view
-    axes.imshow(picture, cmap='gray', vmin=0, vmax=255, extent=extent, aspect='auto')
+    return axes.imshow(picture, cmap='gray', vmin=0, vmax=255, extent=extent, aspect='auto')
 
 
 def _frame_region(axes: Axes, region: BoundingBox) -> None:

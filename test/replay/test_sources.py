@@ -1,0 +1,211 @@
+# Copyright 2026 lmsco_ros contributors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Folders, videos and bags give the same kind of frames; what is broken is named."""
+
+import cv2
+import numpy as np
+import pytest
+from rosbags.typesys import get_typestore, Stores
+
+from lmsco_ros.replay.bag_maker import create_bag, image_message, make_bag
+from lmsco_ros.replay.errors import SourceError
+from lmsco_ros.replay.sources import open_source
+from lmsco_ros.replay.storage import Storage
+
+RAW = 'sensor_msgs/msg/Image'
+COMPRESSED = 'sensor_msgs/msg/CompressedImage'
+
+
+@pytest.fixture
+def bag(tmp_path, frames):
+    path = tmp_path / 'bag'
+    make_bag(frames, path, topic='thermal/image', frame_id='camera', storage=Storage.MCAP,
+             start_ns=1_700_000_000_000_000_000)
+    return path
+
+
+def add_messages(path, topics, storage=Storage.MCAP):
+    """Write a bag with one message on each of `topics`: name to (type, message)."""
+    store = get_typestore(Stores.ROS2_JAZZY)
+    with create_bag(path, storage) as writer:
+        for topic, (kind, message) in topics.items():
+            connection = writer.add_connection(topic, kind, typestore=store)
+            writer.write(connection, 5_000_000_000, store.serialize_cdr(message, kind))
+    return path
+
+
+def text(content):
+    return get_typestore(Stores.ROS2_JAZZY).types['std_msgs/msg/String'](data=content)
+
+
+def raw(stamp_ns=0):
+    store = get_typestore(Stores.ROS2_JAZZY)
+    return image_message(store, np.full((4, 6), 7, np.uint8), stamp_ns, 'camera')
+
+
+def compressed(image):
+    types = get_typestore(Stores.ROS2_JAZZY).types
+    stamp = types['builtin_interfaces/msg/Time'](sec=3, nanosec=4)
+    return types[COMPRESSED](
+        header=types['std_msgs/msg/Header'](stamp=stamp, frame_id=''), format='png',
+        data=cv2.imencode('.png', image)[1].reshape(-1))
+
+
+class TestFolder:
+    def test_sixteen_bit_images_in_natural_order(self, folder, frames):
+        source = open_source(folder, fps=25)
+        read = list(source)
+        assert len(source) == len(read) == 10
+        for frame, original in zip(read, frames):
+            np.testing.assert_array_equal(frame.image, original.image)
+            assert frame.image.dtype == np.uint16
+            assert (frame.index, frame.stamp_ns) == (original.index, original.stamp_ns)
+
+    @pytest.mark.parametrize('suffix', ['png', 'tiff', 'bmp', 'jpg', 'JPG'])
+    def test_formats(self, tmp_path, suffix):
+        image = np.full((20, 30), 77, np.uint8)
+        cv2.imwrite(str(tmp_path / f'0001.{suffix}'), image)
+        frame, = open_source(tmp_path)
+        assert frame.image.shape == (20, 30)
+        assert np.abs(frame.image.astype(int) - 77).max() <= 2
+
+    def test_other_files_do_not_disturb(self, folder):
+        (folder / 'groundtruth.txt').write_text('1,2,3,4')
+        assert len(open_source(folder)) == 10
+
+    def test_one_color_image_does_not_change_the_kind(self, folder):
+        flashy = np.zeros((48, 64, 3), np.uint8)
+        flashy[..., 2] = np.arange(64)
+        for index, image in enumerate((np.zeros((48, 64), np.uint8), flashy)):
+            cv2.imwrite(str(folder / f'frame{index}.bmp'), image)
+        for path in folder.glob('*.png'):
+            path.unlink()
+        assert [f.image.ndim for f in open_source(folder)] == [2, 2]
+
+    def test_empty_folder(self, tmp_path):
+        with pytest.raises(SourceError, match='has no images; give a folder'):
+            open_source(tmp_path)
+
+    def test_folder_of_a_folder_is_told(self, folder):
+        with pytest.raises(SourceError, match=r'images has some: give .*images'):
+            open_source(folder.parent)
+
+    def test_damaged_image_is_named(self, folder):
+        (folder / 'frame4.png').write_bytes(b'no image')
+        with pytest.raises(SourceError, match=r'frame4\.png'):
+            list(open_source(folder))
+
+
+class TestVideo:
+    def test_gray_frames_and_their_rate(self, video):
+        source = open_source(video)
+        frames = list(source)
+        assert len(source) == len(frames) == 12 and source.fps == pytest.approx(20)
+        assert frames[3].stamp_ns == 150_000_000
+        for frame in frames:
+            assert frame.image.shape == (48, 64)
+            assert np.median(frame.image) == pytest.approx(10 * frame.index + 50, abs=2)
+
+    def test_wanted_rate_wins(self, video):
+        assert open_source(video, fps=50).fps == 50
+
+    def test_no_video(self, tmp_path):
+        path = tmp_path / 'film.mp4'
+        path.write_bytes(b'no film')
+        with pytest.raises(SourceError, match='not a readable video'):
+            open_source(path)
+
+    def test_end_cut_off(self, tmp_path):
+        path, random = tmp_path / 'cut.avi', np.random.default_rng(0)
+        writer = cv2.VideoWriter(str(path), cv2.VideoWriter.fourcc(*'MJPG'), 20, (64, 48))
+        for _ in range(40):
+            writer.write(random.integers(0, 255, (48, 64, 3)).astype(np.uint8))
+        writer.release()
+        content = path.read_bytes()
+        path.write_bytes(content[:len(content) * 2 // 3])
+        frames = list(open_source(path))
+        assert 5 < len(frames) < 40
+        assert [f.index for f in frames] == list(range(len(frames)))
+
+
+class TestBag:
+    def test_frames_with_the_stamps_of_their_headers(self, bag, frames):
+        source = open_source(bag)
+        read = list(source)
+        assert len(source) == len(read) == 10 and source.fps == pytest.approx(25)
+        for frame, original in zip(read, frames):
+            np.testing.assert_array_equal(frame.image, original.image)
+            assert frame.stamp_ns == 1_700_000_000_000_000_000 + original.stamp_ns
+
+    def test_storage_file_is_enough(self, bag):
+        path, = bag.glob('*.mcap')
+        assert len(list(open_source(path))) == 10
+
+    @pytest.mark.parametrize('name', ['thermal/image', '/thermal/image', ''])
+    def test_topic_with_or_without_slash(self, bag, name):
+        assert open_source(bag, topic=name).topic == '/thermal/image'
+
+    def test_compressed_images(self, tmp_path, frames):
+        path = add_messages(tmp_path / 'bag', {
+            '/image/compressed': (COMPRESSED, compressed(frames[0].image))})
+        frame, = open_source(path)
+        np.testing.assert_array_equal(frame.image, frames[0].image)
+        assert frame.stamp_ns == 3_000_000_004
+
+    def test_without_stamp_the_time_of_recording_counts(self, tmp_path):
+        path = add_messages(tmp_path / 'bag', {'/image': (RAW, raw())})
+        assert next(iter(open_source(path))).stamp_ns == 5_000_000_000
+
+    def test_several_topics_are_named(self, tmp_path):
+        path = add_messages(tmp_path / 'bag', {'/left': (RAW, raw()), '/right': (RAW, raw())})
+        with pytest.raises(SourceError, match='--topic: /left, /right'):
+            open_source(path)
+        assert open_source(path, topic='right').topic == '/right'
+
+    def test_wrong_topic_is_answered_with_the_right_ones(self, bag):
+        with pytest.raises(SourceError, match='no image topic /nope; it has /thermal/image'):
+            open_source(bag, topic='nope')
+
+    def test_no_image_topic(self, tmp_path):
+        path = add_messages(tmp_path / 'bag', {'/chat': ('std_msgs/msg/String', text('hi'))})
+        with pytest.raises(SourceError, match='has no image topic; it holds /chat'):
+            open_source(path)
+
+    @pytest.mark.parametrize('storage', list(Storage))
+    def test_damaged_storage(self, tmp_path, frames, storage):
+        path = tmp_path / 'broken'
+        make_bag(frames, path, topic='image', frame_id='', storage=storage, start_ns=1)
+        for file in path.glob('*.*'):
+            if file.suffix != '.yaml':
+                file.write_bytes(b'no bag')
+        with pytest.raises(SourceError, match='broken'):
+            open_source(path)
+
+    def test_message_that_cannot_be_decoded_is_named(self, tmp_path):
+        message = raw()
+        message.encoding = 'yuv422'
+        path = add_messages(tmp_path / 'bag', {'/image': (RAW, message)})
+        with pytest.raises(SourceError, match='message 0 on /image.*yuv422'):
+            list(open_source(path))
+
+
+def test_missing_source(tmp_path):
+    with pytest.raises(SourceError, match='does not exist'):
+        open_source(tmp_path / 'nothing')
+
+
+def test_topic_of_something_else_than_a_bag(video):
+    with pytest.raises(SourceError, match='is not a bag'):
+        open_source(video, topic='image')
