@@ -37,7 +37,7 @@ def generate_launch_description() -> LaunchDescription:
             description='Thermal images to track in (sensor_msgs/Image)'),
         DeclareLaunchArgument(
             'namespace', default_value='',
-            description='Namespace of the node and its topics; each of several trackers needs its own'),
+            description='Namespace of the node and its topics; one for each of several trackers'),
         DeclareLaunchArgument(
             'use_large_image_profile', default_value='false',
             description='Give Fast DDS a 32 MiB shared-memory segment for large images'),
