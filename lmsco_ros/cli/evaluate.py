@@ -16,24 +16,18 @@
 
 from __future__ import annotations
 
-from datetime import date
 from enum import Enum
-from fnmatch import fnmatch
 from pathlib import Path
-from typing import Any, Iterator, Optional
+from typing import Annotated, Optional, TYPE_CHECKING
 
-from rich.console import Console
-from rich.progress import (
-    BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn)
 import typer
 
-from lmsco_ros.evaluation.datasets import BrokenSequence, scan_dataset, TrackingSequence
-from lmsco_ros.evaluation.environment import machine, versions
-from lmsco_ros.evaluation.errors import EvaluationError
-from lmsco_ros.evaluation.runner import Evaluation
-from lmsco_ros.evaluation.split import load_split
-from lmsco_ros.evaluation.trackers import available_names, resolve, TrackerSpec
-from lmsco_ros.evaluation.worker_pool import Job, Outcome
+from lmsco_ros.cli.console import frame_progress, plain_errors, say, warn
+
+if TYPE_CHECKING:
+    from lmsco_ros.evaluation.runner import Evaluation
+    from lmsco_ros.evaluation.session import Selection
+    from lmsco_ros.evaluation.worker_pool import Job, Outcome
 
 
 class Protocol(str, Enum):
@@ -53,107 +47,94 @@ class Part(str, Enum):
 def register(app: typer.Typer) -> None:
     """Add the commands of this module to `app`."""
     app.command()(evaluate)
+    app.command()(results)
 
 
 def evaluate(
-    dataset: Path = typer.Argument(
-        ..., help='Folder of a VOT, OTB, PTB-TIR, LSOTB-TIR, Anti-UAV or video dataset.'),
-    output: Path = typer.Option(
-        ..., help='Folder for records, figures and report; finished work in it is kept.'),
-    tracker: Optional[list[str]] = typer.Option(
-        None, help='Preset, OpenCV tracker (csrt, kcf, mil, mosse, medianflow, '
-                   'nanotrack:BACKBONE,HEAD, vit:NET), trax:NAME=COMMAND or '
-                   'python:MODULE:CALLABLE; may be repeated. Default: all that work here.'),
-    protocol: Protocol = typer.Option(
-        Protocol.OPE, help='ope: one pass; vot: start again after each failure.'),
-    sequences: str = typer.Option('*', help='Pattern of names, such as "vot_tir/*" or "bird*".'),
-    frames: Optional[int] = typer.Option(None, min=2, help='Only the first N frames of each.'),
-    jobs: int = typer.Option(1, min=1, help='Number of single-threaded processes.'),
-    split: Optional[Part] = typer.Option(
-        None, help='Only this part of the fixed split of thermal_dev.'),
+    dataset: Annotated[Path, typer.Argument(
+        show_default=False,
+        help='Folder of a VOT, OTB, PTB-TIR, LSOTB-TIR, Anti-UAV or video dataset.')],
+    output: Annotated[Path, typer.Option(
+        file_okay=False, show_default=False,
+        help='Folder for records, plots and report.html; finished work in it is kept.')],
+    tracker: Annotated[Optional[list[str]], typer.Option(
+        show_default='all that work here',
+        help='Preset, csrt, kcf, mil, mosse, medianflow, nanotrack:BACKBONE,HEAD, vit:NET, '
+             'trax:NAME=COMMAND or python:MODULE:CALLABLE. May be repeated.')] = None,
+    protocol: Annotated[Protocol, typer.Option(
+        help='ope: one pass; vot: start again after each failure.')] = Protocol.OPE,
+    sequences: Annotated[str, typer.Option(
+        help='Pattern of names, such as "vot_tir/*" or "bird*".')] = '*',
+    frames: Annotated[Optional[int], typer.Option(
+        min=2, show_default=False, help='Only the first N frames of each sequence.')] = None,
+    jobs: Annotated[int, typer.Option(
+        min=1, help='Number of single-threaded processes.')] = 1,
+    split: Annotated[Optional[Part], typer.Option(
+        show_default=False, help='Only this part of the fixed split of thermal_dev.')] = None,
 ) -> None:
     """Run trackers over a dataset and report accuracy, robustness and speed."""
-    console = Console(stderr=True)
-    try:
-        specs = _trackers(tracker or list(available_names()))
-        chosen, broken = _sequences(dataset, sequences, frames, split)
-        evaluation = Evaluation(specs, chosen, protocol.value, output)
-        _run(evaluation, jobs, console)
-        skipped = [*broken, *evaluation.skipped]
-        evaluation.finish(_context(dataset, specs, sequences, frames, split, jobs, skipped))
-    except EvaluationError as error:
-        console.print(f'[red]error:[/] {error}', highlight=False)
-        raise typer.Exit(2) from error
-    for item in skipped:
-        console.print(f'[yellow]skipped[/] {item.name}: {item.reason}', highlight=False)
+    from lmsco_ros.evaluation.runner import Evaluation
+    from lmsco_ros.evaluation.session import (
+        build_trackers, describe, Request, select_sequences)
+
+    with plain_errors():
+        request = Request(dataset, sequences, frames, split.value if split else None)
+        trackers = build_trackers(tracker or ())
+        selection = select_sequences(request)
+        evaluation = Evaluation(trackers, selection.sequences, protocol.value, output)
+        _run(evaluation, jobs)
+        skipped = [*selection.broken, *evaluation.skipped]
+        for item in skipped:
+            warn(f'skipped {item.name}: {item.reason}')
+        evaluation.finish(describe(request, jobs, skipped))
+        say(f'report: {_report(output, selection)}')
 
 
-def _trackers(names: list[str]) -> list[TrackerSpec]:
-    """Return the trackers in the order given, each of them known to work here."""
-    specs = [resolve(name) for name in dict.fromkeys(names)]
-    for spec in specs:
-        spec.build().close()
-    return specs
+def results(
+    folders: Annotated[list[Path], typer.Argument(
+        show_default=False, help='Output folders of `lmsco evaluate`, on the same sequences.')],
+    page: Annotated[Path, typer.Option(
+        dir_okay=False, help='Markdown file to write.')] = Path('docs/results.md'),
+) -> None:
+    """Write the tables of evaluations as one Markdown page."""
+    from lmsco_ros.evaluation.results_page import results_page
+
+    with plain_errors():
+        text = results_page(folders)
+        page.parent.mkdir(parents=True, exist_ok=True)
+        page.write_text(text, encoding='utf-8')
+        say(f'results: {page}')
 
 
-def _sequences(dataset: Path, pattern: str, frames: Optional[int], split: Optional[Part],
-               ) -> tuple[list[TrackingSequence], list[BrokenSequence]]:
-    """Return what is to be evaluated, and what would be if it were not broken."""
-    scan = scan_dataset(dataset)
-    chosen = [item for item in scan.sequences if _matches(item.full_name, pattern)]
-    broken = [item for item in scan.broken if _matches(item.name, pattern)]
-    if split is not None:
-        fixed = load_split()
-        chosen = fixed.select(split.value, chosen)
-        broken = [item for item in broken if item.name in fixed.parts[split.value]]
-    if not chosen:
-        raise EvaluationError(f'no usable sequence in {dataset} matches {pattern!r}'
-                              + ''.join(f'\n  {item.name}: {item.reason}' for item in broken))
-    return [item.first(frames) if frames else item for item in chosen], broken
+def _report(output: Path, selection: Selection) -> Path:
+    """Write the report on all protocols that have been run into the folder."""
+    from lmsco_ros.evaluation.report.page import write_report
+    from lmsco_ros.evaluation.run_file import read_runs
+
+    return write_report(output, read_runs(output),
+                        {item.full_name: item for item in selection.sequences})
 
 
-def _matches(full_name: str, pattern: str) -> bool:
-    return fnmatch(full_name, pattern) or fnmatch(full_name.rpartition('/')[2], pattern)
-
-
-def _run(evaluation: Evaluation, jobs: int, console: Console) -> None:
-    columns = (TextColumn('{task.description}'), BarColumn(), MofNCompleteColumn(),
-               TextColumn('frames'), TimeElapsedColumn(), TimeRemainingColumn())
+def _run(evaluation: Evaluation, jobs: int) -> None:
     if evaluation.done:
-        console.print(f'{len(evaluation.done)} results are there already, '
-                      f'{len(evaluation.pending)} to go')
-    with Progress(*columns, console=console) as progress:
+        say(f'{len(evaluation.done)} results are there already, '
+            f'{len(evaluation.pending)} to go')
+    with frame_progress() as progress:
         total = sum(len(job.sequence) for job in evaluation.pending)
         task = progress.add_task('evaluating', total=total)
         for job, outcome in evaluation.run(jobs):
             progress.advance(task, len(job.sequence))
-            console.print(_line(job, outcome), highlight=False)
+            progress.console.print(_line(job, outcome), highlight=False, markup=False)
 
 
 def _line(job: Job, outcome: Outcome) -> str:
     """Return what there is to say about a job that is done."""
+    from lmsco_ros.evaluation.worker_pool import Unreadable
+
     where = f'{job.tracker.name:<12} {job.sequence.full_name:<28}'
-    return f'{where} {"; ".join(_remarks(outcome))}'
-
-
-def _remarks(outcome: Outcome) -> Iterator[str]:
-    if not hasattr(outcome, 'updates'):
-        yield f'[yellow]skipped[/] {outcome.reason}'
-        return
-    if outcome.wall_seconds > 0:
-        yield f'{outcome.updates / outcome.wall_seconds:7.1f} frames/s'
-    if outcome.failures:
-        yield f'{len(outcome.failures)} failures'
-    if outcome.error:
-        yield f'[red]crashed[/] {outcome.error}'
-
-
-def _context(dataset: Path, specs: list[TrackerSpec], pattern: str, frames: Optional[int],
-             split: Optional[Part], jobs: int, skipped: list[BrokenSequence]) -> dict[str, Any]:
-    return {
-        'dataset': dataset.resolve().name, 'sequences': pattern, 'frames': frames,
-        'split': split.value if split else None, 'jobs': jobs,
-        'trackers': [spec.name for spec in specs], 'date': date.today().isoformat(),
-        'machine': machine(), 'versions': dict(versions()),
-        'skipped': [{'name': item.name, 'reason': item.reason} for item in skipped],
-    }
+    if isinstance(outcome, Unreadable):
+        return f'{where} skipped: {outcome.reason}'
+    rate = outcome.updates / outcome.wall_seconds if outcome.wall_seconds else 0.0
+    failures = f', {len(outcome.failures)} failures' if outcome.failures else ''
+    crash = f', crashed: {outcome.error}' if outcome.error else ''
+    return f'{where} {rate:7.1f} frames/s{failures}{crash}'

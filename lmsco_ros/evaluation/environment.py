@@ -24,6 +24,8 @@ from typing import Mapping
 
 import cv2
 
+from lmsco_ros.evaluation.trackers.code_version import core_version
+
 _DISTRIBUTIONS = ('lmsco_ros', 'numpy', 'scipy', 'torch')
 
 
@@ -41,6 +43,7 @@ def versions() -> Mapping[str, str]:
             found[name] = metadata.version(name)
         except metadata.PackageNotFoundError:
             continue
+    found['tracker core'] = core_version()
     return found
 
 

@@ -37,7 +37,8 @@ class RecordStore:
 
     A record's name holds a digest of everything that its content depends on: settings
     and code of the tracker, frames and ground truth, protocol, and the code that runs
-    it. A record that exists is therefore never out of date.
+    it. A record that exists is therefore never out of date. A tracker's version is
+    taken when it is first asked for, so that code edited during a run does not split it.
 
     Parameters
     ----------
@@ -49,12 +50,16 @@ class RecordStore:
     def __init__(self, output: Path) -> None:
         """Note the folder; it is made with the first record."""
         self._output = output
+        self._identities: dict[str, str] = {}
         modules = (execution, frames, geometry, trace)
         self._code = sources_digest(tuple(Path(module.__file__) for module in modules))
 
     def path(self, job: Job) -> Path:
         """Return where the record of `job` belongs, relative to the output folder."""
-        parts = (job.tracker.identity, job.sequence.fingerprint, job.protocol, self._code)
+        if job.tracker.name not in self._identities:
+            self._identities[job.tracker.name] = job.tracker.identity
+        parts = (self._identities[job.tracker.name], job.sequence.fingerprint, job.protocol,
+                 self._code)
         digest = hashlib.sha256('\0'.join(parts).encode()).hexdigest()[:12]
         name = _file_name(f'{job.sequence.group}-{job.sequence.name}')
         return Path('records', job.protocol, _file_name(job.tracker.name), f'{name}-{digest}.json')

@@ -31,6 +31,7 @@ import numpy as np
 import numpy.typing as npt
 
 from lmsco_ros.evaluation.errors import DatasetError
+from lmsco_ros.evaluation.execution import PROTOCOLS
 from lmsco_ros.evaluation.geometry import overlaps
 from lmsco_ros.evaluation.record_store import read_record, write_json
 from lmsco_ros.evaluation.trace import Trace
@@ -117,6 +118,12 @@ class EvaluationRun:
         """Names of the trackers."""
         return tuple(self.traces)
 
+    def crashes(self, tracker: str) -> tuple[str, ...]:
+        """Return `sequence: what happened` for each sequence that `tracker` crashed on."""
+        return tuple(f'{sequence.full_name}: {trace.error}'
+                     for sequence, trace in zip(self.sequences, self.traces[tracker])
+                     if trace.error)
+
     def only(self, groups: Optional[tuple[str, ...]]) -> EvaluationRun:
         """Return the run on the sequences of `groups`; None keeps all."""
         kept = [index for index, sequence in enumerate(self.sequences)
@@ -150,6 +157,12 @@ def read_run(output: Path, protocol: str) -> Optional[EvaluationRun]:
               for name, records in content['records'].items()}
     sequences = tuple(SequenceInfo.from_json(item) for item in content['sequences'])
     return EvaluationRun(content['protocol'], sequences, traces, content['context'])
+
+
+def read_runs(output: Path) -> dict[str, EvaluationRun]:
+    """Return the runs in a folder by their protocol."""
+    return {protocol: run for protocol in PROTOCOLS
+            if (run := read_run(output, protocol)) is not None}
 
 
 def _record(path: Path) -> Trace:

@@ -19,20 +19,36 @@ import math
 import numpy as np
 import pytest
 
-from lmsco_ros.evaluation.protocols.confidence import auroc, lost_figures
+from lmsco_ros.evaluation.protocols.confidence import auroc, auroc_terms, lost_figures
+
+
+def pooled(scores, overlap, weights=None):
+    """Return the AUROC over some sequences."""
+    terms = auroc_terms([np.array(score) for score in scores],
+                        [np.array(value) for value in overlap])
+    return auroc(*terms, np.ones(len(scores)) if weights is None else np.array(weights))
 
 
 def test_auroc_counts_pairs_in_order():
-    overlap = np.array([.9, .8, .1, .2, np.nan])
+    overlap = [[.9, .8, .1, .2, np.nan]]
     # Good frames score .9 and .4, bad ones .4 and .1: three pairs right, one tied.
-    scores = np.array([.9, .4, .4, .1, 1])
-    assert auroc(scores, overlap) == pytest.approx(3.5 / 4)
-    assert auroc(-scores, overlap) == pytest.approx(0.5 / 4)
+    scores = [[.9, .4, .4, .1, 1]]
+    assert pooled(scores, overlap) == pytest.approx(3.5 / 4)
+    assert pooled([[-score for score in scores[0]]], overlap) == pytest.approx(0.5 / 4)
+
+
+def test_auroc_pools_and_weighs_sequences():
+    scores, overlap = [[.9, .3], [.5, .7, np.nan]], [[.9, .1], [.9, .1, .9]]
+    # Good .9 and .5, bad .3 and .7: three of four pairs in order.
+    assert pooled(scores, overlap) == pytest.approx(3 / 4)
+    assert pooled(scores, overlap, [0, 1]) == 0
+    # The first sequence twice: good .9 .9 .5, bad .3 .3 .7.
+    assert pooled(scores, overlap, [2, 1]) == pytest.approx(8 / 9)
 
 
 def test_auroc_is_unknown_without_both_kinds_or_without_scores():
-    assert math.isnan(auroc(np.array([.9, .8]), np.array([.9, .8])))
-    assert math.isnan(auroc(np.full(2, np.nan), np.array([.9, .1])))
+    assert math.isnan(pooled([[.9, .8]], [[.9, .8]]))
+    assert math.isnan(pooled([[np.nan, np.nan]], [[.9, .1]]))
 
 
 def test_time_to_lost_after_each_absence():

@@ -17,10 +17,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Optional, Sequence
 
 import numpy as np
 import numpy.typing as npt
-from scipy.stats import rankdata
 
 from lmsco_ros.evaluation.geometry import Array
 
@@ -49,37 +49,65 @@ class LostFigures:
 
     """
 
-    delays: tuple[object, ...]
+    delays: tuple[Optional[int], ...]
     false_alarms: int
     frames_present: int
     lost_while_present: int
 
 
-def auroc(scores: Array, overlap: Array) -> float:
+def auroc_terms(scores: Sequence[Array], overlap: Sequence[Array]) -> tuple[Array, Array, Array]:
+    """
+    Return the pair counts that the AUROC over any choice of sequences is made of.
+
+    Parameters
+    ----------
+    scores : sequence of ndarray
+        For each sequence, the tracker's score for each frame; NaN where it gave none.
+    overlap : sequence of ndarray
+        Overlap for each frame; good is above 0.5. NaN where the target is absent.
+
+    Returns
+    -------
+    ordered : ndarray, shape (sequences, sequences)
+        Pairs of a good frame of sequence i and a bad one of sequence j in which the good
+        one has the higher score, ties counted half.
+    good, bad : ndarray, shape (sequences,)
+        Number of good and of bad frames with a score.
+
+    """
+    kept = [np.isfinite(score) & np.isfinite(value) for score, value in zip(scores, overlap)]
+    good = [score[keep & (value > GOOD_OVERLAP)]
+            for score, value, keep in zip(scores, overlap, kept)]
+    bad = [np.sort(score[keep & (value <= GOOD_OVERLAP)])
+           for score, value, keep in zip(scores, overlap, kept)]
+    ordered = np.array([[(np.searchsorted(low, high, 'left').sum()
+                          + np.searchsorted(low, high, 'right').sum()) / 2
+                         for low in bad] for high in good])
+    return ordered, np.array([float(len(part)) for part in good]), np.array(
+        [float(len(part)) for part in bad])
+
+
+def auroc(ordered: Array, good: Array, bad: Array, weights: Array) -> Array:
     """
     Return the chance that a good frame is scored above a bad one.
 
     Parameters
     ----------
-    scores : ndarray, shape (n,)
-        The tracker's score for each frame; NaN where it gave none.
-    overlap : ndarray, shape (n,)
-        Overlap for each frame; good is above 0.5. NaN where the target is absent.
+    ordered, good, bad : ndarray
+        Pair counts from `auroc_terms`.
+    weights : ndarray, shape (..., sequences)
+        How often each sequence counts.
 
     Returns
     -------
-    float
-        Area under the receiver operating characteristic in [0, 1], ties counted half;
-        NaN unless there are both good and bad frames.
+    ndarray, shape (...)
+        Area under the receiver operating characteristic in [0, 1]; NaN unless there are
+        both good and bad frames.
 
     """
-    known = np.isfinite(scores) & np.isfinite(overlap)
-    good = overlap[known] > GOOD_OVERLAP
-    positives, negatives = int(good.sum()), int((~good).sum())
-    if not positives or not negatives:
-        return float('nan')
-    ranks = rankdata(scores[known])
-    return float((ranks[good].sum() - positives * (positives + 1) / 2) / (positives * negatives))
+    pairs = (weights @ good) * (weights @ bad)
+    right = np.einsum('...i,ij,...j->...', weights, ordered, weights)
+    return np.divide(right, pairs, out=np.full(np.shape(pairs), np.nan), where=pairs > 0)
 
 
 def lost_figures(lost: Flags, overlap: Array) -> LostFigures:
@@ -113,5 +141,5 @@ def _absences(absent: Flags) -> list[tuple[int, int]]:
             for start in starts]
 
 
-def _delay(lost: Flags) -> object:
+def _delay(lost: Flags) -> Optional[int]:
     return int(np.argmax(lost)) if lost.any() else None

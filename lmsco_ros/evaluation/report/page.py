@@ -1,0 +1,213 @@
+# Copyright 2026 lmsco_ros contributors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The report of an output folder: one self-contained page and its plots as PNG files."""
+
+from __future__ import annotations
+
+import base64
+from dataclasses import dataclass
+from importlib import resources
+from io import BytesIO
+from pathlib import Path
+from typing import Any, Iterable, Mapping, Optional
+
+from jinja2 import Environment, StrictUndefined
+from matplotlib.figure import Figure
+import numpy as np
+
+from lmsco_ros.evaluation.datasets import TrackingSequence
+from lmsco_ros.evaluation.report.conditions import conditions, problems
+from lmsco_ros.evaluation.report.failures import worst_failures
+from lmsco_ros.evaluation.report.formatting import number
+from lmsco_ros.evaluation.report.one_pass_plots import one_pass_plots
+from lmsco_ros.evaluation.report.pictures import (
+    encode, failure_strip, thumbnail, TRUTH_COLOR)
+from lmsco_ros.evaluation.report.style import looks
+from lmsco_ros.evaluation.report.supervised_plots import supervised_plots
+from lmsco_ros.evaluation.report.tables import (
+    Cell, confidence_table, difference_rows, one_pass_table, Row, supervised_table, Table)
+from lmsco_ros.evaluation.run_file import EvaluationRun
+from lmsco_ros.evaluation.summaries.attributes import attribute_names, summarize_attributes
+from lmsco_ros.evaluation.summaries.confidence import summarize_confidence
+from lmsco_ros.evaluation.summaries.differences import differences
+from lmsco_ros.evaluation.summaries.one_pass import summarize_one_pass
+from lmsco_ros.evaluation.summaries.supervised import eao_interval, summarize_supervised
+
+_TITLE = 'Thermal tracking evaluation'
+
+
+@dataclass(frozen=True)
+class _Heat:
+    """A figure of one tracker on one sequence, with a background that shows it."""
+
+    text: str
+    note: str
+    color: str
+
+
+def write_report(output: Path, runs: Mapping[str, EvaluationRun],
+                 sequences: Mapping[str, TrackingSequence]) -> Path:
+    """
+    Write `report.html`, and each plot and strip as a PNG file beside it.
+
+    Parameters
+    ----------
+    output : Path
+        Folder of the evaluation.
+    runs : mapping of str to EvaluationRun
+        The run under 'ope', under 'vot', or both.
+    sequences : mapping of str to TrackingSequence
+        Images of the sequences by full name; those missing get no pictures.
+
+    Returns
+    -------
+    Path
+        The page.
+
+    """
+    main = runs.get('ope') or runs['vot']
+    pictures = output / 'pictures'
+    pictures.mkdir(parents=True, exist_ok=True)
+    trackers = dict.fromkeys(name for run in runs.values() for name in run.trackers)
+    colors = {name: look.color for name, look in looks(trackers).items()}
+    page = _template().render(
+        title=_TITLE, subtitle=_subtitle(main, trackers), colors=colors,
+        truth_color=TRUTH_COLOR, problems=problems(runs), conditions=conditions(runs),
+        ope=_one_pass(runs['ope'], pictures) if 'ope' in runs else None,
+        vot=_supervised(runs['vot'], pictures) if 'vot' in runs else None,
+        failures=list(_failures(main, sequences, colors, pictures)),
+        **_sequence_table(runs, sequences))
+    path = output / 'report.html'
+    path.write_text(page, encoding='utf-8')
+    return path
+
+
+def _template() -> Any:
+    source = resources.files(__package__).joinpath('template.html').read_text(encoding='utf-8')
+    environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True,
+                              lstrip_blocks=True)
+    return environment.from_string(source)
+
+
+def _subtitle(run: EvaluationRun, trackers: Iterable[str]) -> str:
+    frames = sum(len(sequence.ground_truth) for sequence in run.sequences)
+    names = ', '.join(trackers)
+    return (f'{len(run.sequences)} sequences, {frames} frames of '
+            f'{run.context.get("dataset", "a dataset")} · {names} · '
+            f'{run.context.get("date", "")}')
+
+
+def _one_pass(run: EvaluationRun, folder: Path) -> dict[str, Any]:
+    summaries = summarize_one_pass(run)
+    aucs = {item.tracker: item.aucs for item in summaries}
+    return {
+        'table': one_pass_table(summaries),
+        'plots': _save_plots(one_pass_plots(summaries), folder),
+        'differences': difference_rows(differences(aucs, higher_is_better=True), 3),
+        'attributes': _attributes(run, 'frames'),
+        'confidence': confidence_table(summarize_confidence(run)),
+    }
+
+
+def _supervised(run: EvaluationRun, folder: Path) -> dict[str, Any]:
+    summaries = summarize_supervised(run)
+    failures = {item.tracker: item.failures for item in summaries}
+    interval = eao_interval(run)
+    return {
+        'table': supervised_table(summaries),
+        'plots': _save_plots(supervised_plots(summaries, interval), folder),
+        'differences': difference_rows(differences(failures, higher_is_better=False), 2),
+        'attributes': _attributes(run, 'failures'),
+        'interval': interval,
+    }
+
+
+def _attributes(run: EvaluationRun, counted: str) -> Optional[Table]:
+    rows = []
+    for tracker, figures in summarize_attributes(run).items():
+        cells = tuple(Cell(number(item.mean_overlap), str(getattr(item, counted)))
+                      for item in figures.values())
+        rows.append(Row(tracker, cells))
+    titles = tuple(name.replace('_', ' ') for name in attribute_names(run))
+    return Table(titles, tuple(rows)) if rows else None
+
+
+def _sequence_table(runs: Mapping[str, EvaluationRun],
+                    sequences: Mapping[str, TrackingSequence]) -> dict[str, Any]:
+    main = runs.get('ope') or runs['vot']
+    one_pass = 'ope' in runs
+    figures = ([item.aucs for item in summarize_one_pass(main)] if one_pass
+               else [item.accuracies for item in summarize_supervised(main)])
+    failures = _failure_counts(runs.get('vot'))
+    rows = []
+    for index, sequence in enumerate(main.sequences):
+        images = sequences.get(sequence.full_name)
+        cells = [_heat(float(values[index]), failures.get((name, sequence.full_name)))
+                 for name, values in zip(main.trackers, figures)]
+        rows.append({
+            'name': sequence.name, 'group': sequence.group, 'cells': cells,
+            'size': f'{sequence.size[0]} × {sequence.size[1]}',
+            'frames': len(sequence.ground_truth),
+            'picture': _uri(encode(thumbnail(images), '.jpg'), 'jpeg') if images else None})
+    note = ('Success AUC' if one_pass else 'Accuracy') + ' of each tracker on each sequence'
+    return {'sequence_rows': rows, 'sequence_columns': main.trackers,
+            'sequence_note': note + ('; below it the failures under the VOT protocol.'
+                                     if failures else '.')}
+
+
+def _failure_counts(run: Optional[EvaluationRun]) -> dict[tuple[str, str], int]:
+    if run is None:
+        return {}
+    return {(name, sequence.full_name): len(trace.failures)
+            for name, traces in run.traces.items()
+            for sequence, trace in zip(run.sequences, traces)}
+
+
+def _heat(value: float, failures: Optional[int]) -> _Heat:
+    """Return a cell that goes from red at 0 over white at one half to green at 1."""
+    strength = min(abs(value - 0.5) * 2, 1) if np.isfinite(value) else 0
+    tint = '42, 157, 88' if value >= 0.5 else '193, 18, 31'
+    note = '' if not failures else f'{failures} failure{"s" if failures > 1 else ""}'
+    return _Heat(number(value), note, f'rgba({tint}, {0.45 * strength:.2f})')
+
+
+def _failures(run: EvaluationRun, sequences: Mapping[str, TrackingSequence],
+              colors: Mapping[str, str], folder: Path) -> Iterable[dict[str, str]]:
+    for failure in worst_failures(run):
+        info = run.sequences[failure.sequence]
+        images = sequences.get(info.full_name)
+        if images is not None:
+            trace = run.traces[failure.tracker][failure.sequence]
+            strip = failure_strip(images, trace, failure.frames, colors[failure.tracker])
+            name = f'failure_{failure.tracker}_{info.group}_{info.name}.png'
+            (folder / name).write_bytes(encode(strip, '.png'))
+            yield {'tracker': failure.tracker, 'sequence': info.full_name,
+                   'overlap': number(failure.mean_overlap),
+                   'picture': _uri(encode(strip, '.jpg'), 'jpeg')}
+
+
+def _save_plots(figures: Mapping[str, Figure], folder: Path) -> list[dict[str, str]]:
+    items = []
+    for name, figure in figures.items():
+        stream = BytesIO()
+        figure.savefig(stream, format='png')
+        (folder / f'{name}.png').write_bytes(stream.getvalue())
+        items.append({'name': name.replace('_', ' '),
+                      'source': _uri(stream.getvalue(), 'png')})
+    return items
+
+
+def _uri(content: bytes, kind: str) -> str:
+    return f'data:image/{kind};base64,{base64.b64encode(content).decode()}'

@@ -1,0 +1,178 @@
+# Copyright 2026 lmsco_ros contributors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Tables of figures, ready to be written as HTML or as Markdown."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+import math
+from typing import Callable, Generic, Optional, Sequence, TypeVar
+
+from lmsco_ros.evaluation.protocols.bootstrap import Estimate
+from lmsco_ros.evaluation.report.formatting import interval, is_real, number, signed
+from lmsco_ros.evaluation.summaries.confidence import ConfidenceSummary
+from lmsco_ros.evaluation.summaries.differences import Difference
+from lmsco_ros.evaluation.summaries.one_pass import OnePassSummary
+from lmsco_ros.evaluation.summaries.supervised import SupervisedSummary
+
+Summary = TypeVar('Summary')
+
+
+@dataclass(frozen=True)
+class Cell:
+    """A figure as text, its interval, and whether it is the best of its column."""
+
+    text: str
+    range: str = ''
+    best: bool = False
+
+
+@dataclass(frozen=True)
+class Row:
+    """The figures of one tracker; `bar` is what the page draws beside its name."""
+
+    tracker: str
+    cells: tuple[Cell, ...]
+    bar: Optional[Estimate] = None
+
+
+@dataclass(frozen=True)
+class Table:
+    """Column titles and rows."""
+
+    columns: tuple[str, ...]
+    rows: tuple[Row, ...]
+
+    @property
+    def bars(self) -> bool:
+        """Whether rows have a bar."""
+        return any(row.bar is not None for row in self.rows)
+
+
+@dataclass(frozen=True)
+class DifferenceRow:
+    """One tracker against the reference."""
+
+    tracker: str
+    reference: str
+    cell: Cell
+    better: int
+    worse: int
+
+
+@dataclass(frozen=True)
+class _Column(Generic[Summary]):
+    """
+    How a column is made.
+
+    Attributes
+    ----------
+    title : str
+        Heading.
+    estimate : callable
+        The figure of a summary.
+    decimals : int
+        Digits after the point.
+    direction : int
+        +1 when higher is better, -1 when lower is, 0 when there is no better.
+    ranged : bool
+        Whether the interval is shown.
+
+    """
+
+    title: str
+    estimate: Callable[[Summary], Estimate]
+    decimals: int = 3
+    direction: int = 1
+    ranged: bool = True
+
+
+def one_pass_table(summaries: Sequence[OnePassSummary]) -> Table:
+    """Return the main table of a one-pass run."""
+    columns: tuple[_Column[OnePassSummary], ...] = (
+        _Column('success AUC', lambda item: item.success_auc),
+        _Column('precision 5 px', lambda item: item.precision_5),
+        _Column('precision 20 px', lambda item: item.precision_20),
+        _Column('normalized precision', lambda item: item.normalized_auc),
+        _Column('frames/s (processor)', lambda item: item.cpu_rate, 1, ranged=False),
+        _Column('frames/s (clock)', lambda item: item.wall_rate, 1, ranged=False))
+    return _table(columns, summaries, lambda item: item.success_auc)
+
+
+def supervised_table(summaries: Sequence[SupervisedSummary]) -> Table:
+    """Return the main table of a supervised run."""
+    columns: tuple[_Column[SupervisedSummary], ...] = (
+        _Column('EAO', lambda item: item.eao),
+        _Column('EAO (Python toolkit)', lambda item: item.eao_python),
+        _Column('accuracy', lambda item: item.accuracy),
+        _Column('failures', lambda item: _plain(item.failures.sum()), 0, -1),
+        _Column('failures per sequence', lambda item: item.failures_per_sequence, 2, -1),
+        _Column('failures per 100 frames', lambda item: item.failures_per_100_frames, 2, -1),
+        _Column('reliability', lambda item: item.reliability),
+        _Column('accuracy rank', lambda item: _plain(item.accuracy_rank), 2, -1),
+        _Column('robustness rank', lambda item: _plain(item.robustness_rank), 2, -1))
+    return _table(columns, summaries, lambda item: item.eao)
+
+
+def confidence_table(summaries: Sequence[ConfidenceSummary]) -> Table:
+    """Return the table of scores and LOST declarations."""
+    columns: tuple[_Column[ConfidenceSummary], ...] = (
+        _Column('AUROC of the score', lambda item: item.auroc),
+        _Column('targets that left', lambda item: _plain(item.departures), 0, 0),
+        _Column('LOST declared', lambda item: _plain(item.declared), 0),
+        _Column('median frames to LOST', lambda item: _plain(item.delay), 0, -1),
+        _Column('false LOST per 1000 frames', lambda item: item.false_alarms, 2, -1),
+        _Column('share of frames LOST', lambda item: item.lost_share, 3, 0))
+    return _table(columns, summaries, None)
+
+
+def difference_rows(differences: Sequence[Difference], decimals: int) -> tuple[DifferenceRow, ...]:
+    """Return one row for each difference; bold (`best`) where it is real."""
+    return tuple(
+        DifferenceRow(item.tracker, item.reference,
+                      Cell(signed(item.difference, decimals),
+                           interval(item.difference, decimals), is_real(item.difference)),
+                      item.better, item.worse)
+        for item in differences)
+
+
+def _table(columns: Sequence[_Column[Summary]], summaries: Sequence[Summary],
+           bar: Optional[Callable[[Summary], Estimate]]) -> Table:
+    best = [_best(column, summaries) for column in columns]
+    rows = tuple(
+        Row(tracker=summary.tracker, bar=bar(summary) if bar else None,
+            cells=tuple(_cell(column, summary, target) for column, target in zip(columns, best)))
+        for summary in summaries)
+    return Table(tuple(column.title for column in columns), rows)
+
+
+def _cell(column: _Column[Summary], summary: Summary, best: str) -> Cell:
+    figure = column.estimate(summary)
+    text = number(figure.value, column.decimals)
+    return Cell(text, interval(figure, column.decimals) if column.ranged else '', text == best)
+
+
+def _best(column: _Column[Summary], summaries: Sequence[Summary]) -> str:
+    """Return the text of the best figure of a column, empty where there is no choice."""
+    values = [column.estimate(summary).value for summary in summaries]
+    known = [value for value in values if math.isfinite(value)]
+    if len(known) < 2 or not column.direction or len(set(known)) == 1:
+        return ''
+    return number(max(known) if column.direction > 0 else min(known), column.decimals)
+
+
+def _plain(value: float) -> Estimate:
+    """Return a figure that has no interval."""
+    return Estimate(float(value), float('nan'), float('nan'))

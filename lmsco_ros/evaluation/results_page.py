@@ -1,0 +1,179 @@
+# Copyright 2026 lmsco_ros contributors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""`docs/results.md`: the tables of one or more evaluations as Markdown."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Iterable, Mapping, Optional, Sequence
+
+from lmsco_ros.evaluation.errors import DatasetError
+from lmsco_ros.evaluation.execution import PROTOCOLS
+from lmsco_ros.evaluation.report.conditions import conditions, problems
+from lmsco_ros.evaluation.report.tables import (
+    Cell, confidence_table, difference_rows, DifferenceRow, one_pass_table, supervised_table,
+    Table)
+from lmsco_ros.evaluation.run_file import EvaluationRun, read_run
+from lmsco_ros.evaluation.split import load_split
+from lmsco_ros.evaluation.summaries.confidence import summarize_confidence
+from lmsco_ros.evaluation.summaries.differences import differences
+from lmsco_ros.evaluation.summaries.one_pass import summarize_one_pass
+from lmsco_ros.evaluation.summaries.supervised import eao_interval, summarize_supervised
+
+_INTRODUCTION = """\
+# Results
+
+Written by `lmsco results`; do not change by hand.
+
+Brackets hold 95 % bootstrap intervals over sequences; bold is the best of a column.
+
+**What this is not.** These are a few thermal sequences, not a benchmark: the published
+averages of VOT-TIR, PTB-TIR and LSOTB-TIR need the full benchmarks, which cannot be
+passed on and which `lmsco evaluate` reads where you have them. EAO here is taken over
+these sequences and compares within this page only. `drone_ir` is a subsample of the
+clips of its source, and the forty in the test part were picked as hard ones by the
+criteria of `lmsco_ros/evaluation/split_selection.py`, not at random.
+"""
+
+_ONE_PASS_NOTE = """\
+Started once on the first frame and never helped again. Success AUC over 21 overlap
+thresholds; precision is the share of frames with a center error of at most 5 or 20
+pixels; normalized precision the mean share within 0 to 0.5 target sizes. Frames per
+second for one thread: of processor time, and on the clock with as many evaluations side
+by side as the conditions say.
+"""
+
+_SUPERVISED_NOTE = """\
+Started again five frames after each frame without overlap. Accuracy without the ten
+frames after each start, weighted by sequence length; reliability is the chance to
+survive 30 frames. EAO is the mean of the expected-overlap curve over sequence lengths of
+{low} to {high} frames, the curve followed to the longest sequence (MATLAB toolkit). The
+figure of the Python toolkit, whose curve ends at the tracker's own longest fragment and
+which so overrates trackers that fail early, stands beside it.
+"""
+
+_CONFIDENCE_NOTE = """\
+AUROC is the chance that a frame with an overlap above one half has a higher score than
+one without; 0.5 is guessing. LOST is false when it is declared on a target that is there
+and was covered by more than half one frame before.
+"""
+
+
+def results_page(folders: Sequence[Path]) -> str:
+    """
+    Return the tables of evaluation folders as Markdown.
+
+    Parameters
+    ----------
+    folders : sequence of Path
+        Outputs of `lmsco evaluate`; trackers of several folders come into one table.
+
+    Raises
+    ------
+    DatasetError
+        When a folder holds no run, or two runs are on different sequences.
+
+    """
+    runs = {protocol: run for protocol in PROTOCOLS
+            if (run := _merged(folders, protocol)) is not None}
+    if not runs:
+        raise DatasetError(f'no results in {", ".join(map(str, folders))}; '
+                           'give output folders of `lmsco evaluate`')
+    parts = [_INTRODUCTION]
+    for title, groups in _scenes(next(iter(runs.values()))):
+        parts += _scene(title, {name: run.only(groups) for name, run in runs.items()})
+    parts += ['## Conditions\n', _conditions(runs)]
+    return '\n'.join(parts)
+
+
+def _merged(folders: Iterable[Path], protocol: str) -> Optional[EvaluationRun]:
+    """Return one run with the trackers of all folders."""
+    merged: Optional[EvaluationRun] = None
+    for folder in folders:
+        run = read_run(folder, protocol)
+        if run is None:
+            continue
+        if merged is None:
+            merged = run
+        elif _names(run) != _names(merged):
+            raise DatasetError(f'{folder} is on other sequences than the folders before it; '
+                               'tables need the same sequences for all trackers')
+        else:
+            merged = EvaluationRun(protocol, merged.sequences,
+                                   {**merged.traces, **run.traces}, merged.context)
+    return merged
+
+
+def _names(run: EvaluationRun) -> list[tuple[str, int]]:
+    return [(sequence.full_name, len(sequence.ground_truth)) for sequence in run.sequences]
+
+
+def _scenes(run: EvaluationRun) -> list[tuple[str, Optional[tuple[str, ...]]]]:
+    """Return the kinds of scene that the run has sequences of, then all together."""
+    present = {sequence.group for sequence in run.sequences}
+    found = [(f'{scene.capitalize()} ({", ".join(groups)})', groups)
+             for scene, groups in load_split().scenes.items() if present & set(groups)]
+    return found + [('All sequences', None)] if len(found) != 1 else found
+
+
+def _scene(title: str, runs: Mapping[str, EvaluationRun]) -> list[str]:
+    main = next(iter(runs.values()))
+    frames = sum(len(sequence.ground_truth) for sequence in main.sequences)
+    parts = [f'## {title}\n', f'{len(main.sequences)} sequences, {frames} frames.\n']
+    if 'ope' in runs:
+        summaries = summarize_one_pass(runs['ope'])
+        aucs = {item.tracker: item.aucs for item in summaries}
+        parts += ['### One pass\n', _ONE_PASS_NOTE, _markdown(one_pass_table(summaries)),
+                  _comparison(difference_rows(differences(aucs, True), 3), 'success AUC'),
+                  '### Confidence\n', _CONFIDENCE_NOTE,
+                  _markdown(confidence_table(summarize_confidence(runs['ope'])))]
+    if 'vot' in runs:
+        supervised = summarize_supervised(runs['vot'])
+        failures = {item.tracker: item.failures for item in supervised}
+        low, high = eao_interval(runs['vot'])
+        parts += ['### VOT supervised\n', _SUPERVISED_NOTE.format(low=low, high=high),
+                  _markdown(supervised_table(supervised)),
+                  _comparison(difference_rows(differences(failures, False), 2),
+                              'failures per sequence (fewer is better)')]
+    return parts
+
+
+def _comparison(rows: Sequence[DifferenceRow], figure: str) -> str:
+    if not rows:
+        return ''
+    head = (f'Paired difference to {rows[0].reference}, bold where the interval leaves out '
+            f'zero:\n\n| tracker | {figure} | sequences better | worse |\n|---|---|---|---|\n')
+    return head + ''.join(f'| {row.tracker} | {_text(row.cell)} | {row.better} | {row.worse} |\n'
+                          for row in rows)
+
+
+def _markdown(table: Table) -> str:
+    lines = ['| ' + ' | '.join(['tracker', *table.columns]) + ' |',
+             '|' + '---|' * (len(table.columns) + 1)]
+    lines += ['| ' + ' | '.join([row.tracker, *map(_text, row.cells)]) + ' |'
+              for row in table.rows]
+    return '\n'.join(lines) + '\n'
+
+
+def _text(cell: Cell) -> str:
+    text = f'**{cell.text}**' if cell.best else cell.text
+    return f'{text} ({cell.range})' if cell.range else text
+
+
+def _conditions(runs: Mapping[str, EvaluationRun]) -> str:
+    lines = [f'- {key}: `{value}`' if key == 'command' else f'- {key}: {value}'
+             for key, value in conditions(runs)]
+    lines += [f'- {problem}' for problem in problems(runs)]
+    return '\n'.join(lines) + '\n'

@@ -1,0 +1,122 @@
+# Copyright 2026 lmsco_ros contributors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""What `lmsco evaluate` is asked for, resolved: who, on what, and how to say so later."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from datetime import date
+from fnmatch import fnmatch
+from pathlib import Path
+from typing import Any, Optional, Sequence
+
+from lmsco_ros.evaluation.datasets import BrokenSequence, scan_dataset, TrackingSequence
+from lmsco_ros.evaluation.environment import machine, versions
+from lmsco_ros.evaluation.errors import DatasetError
+from lmsco_ros.evaluation.split import load_split
+from lmsco_ros.evaluation.trackers import available_names, resolve, TrackerSpec
+
+
+@dataclass(frozen=True)
+class Request:
+    """
+    The sequences that an evaluation is asked for.
+
+    Attributes
+    ----------
+    dataset : Path
+        Folder of the dataset.
+    pattern : str
+        Shell pattern for `name` or `group/name`.
+    frames : int or None
+        Only the first so many frames of each sequence.
+    part : str or None
+        Only this part of the fixed split.
+
+    """
+
+    dataset: Path
+    pattern: str = '*'
+    frames: Optional[int] = None
+    part: Optional[str] = None
+
+
+@dataclass(frozen=True)
+class Selection:
+    """Sequences to evaluate, and those that would have been but are broken."""
+
+    sequences: tuple[TrackingSequence, ...]
+    broken: tuple[BrokenSequence, ...]
+
+
+def select_sequences(request: Request) -> Selection:
+    """
+    Return the sequences of a request.
+
+    Raises
+    ------
+    DatasetError
+        When none is left.
+
+    """
+    scan = scan_dataset(request.dataset)
+    chosen = [item for item in scan.sequences if _matches(item.full_name, request.pattern)]
+    broken = [item for item in scan.broken if _matches(item.name, request.pattern)]
+    if request.part is not None:
+        split = load_split()
+        chosen = split.select(request.part, chosen)
+        broken = [item for item in broken if item.name in split.parts[request.part]]
+    if not chosen:
+        reasons = ''.join(f'\n  {item.name}: {item.reason}' for item in broken)
+        raise DatasetError(f'no usable sequence of {request.dataset} matches '
+                           f'{request.pattern!r}{reasons}')
+    if request.frames is not None:
+        chosen = [item.first(request.frames) for item in chosen]
+    return Selection(tuple(chosen), tuple(broken))
+
+
+def build_trackers(names: Sequence[str]) -> tuple[TrackerSpec, ...]:
+    """
+    Return the trackers in the order given, each of them known to work here.
+
+    Parameters
+    ----------
+    names : sequence of str
+        As on the command line; all that work here when empty.
+
+    Raises
+    ------
+    TrackerError
+        When one is unknown or cannot be built here.
+
+    """
+    specs = tuple(resolve(name) for name in dict.fromkeys(names or available_names()))
+    for spec in specs:
+        spec.build().close()
+    return specs
+
+
+def describe(request: Request, jobs: int, skipped: Sequence[BrokenSequence]) -> dict[str, Any]:
+    """Return the conditions of a run for its run file; no paths, no host."""
+    return {
+        'dataset': request.dataset.resolve().name, 'sequences': request.pattern,
+        'frames': request.frames, 'split': request.part, 'jobs': jobs,
+        'date': date.today().isoformat(), 'machine': machine(), 'versions': dict(versions()),
+        'skipped': [{'name': item.name, 'reason': item.reason} for item in skipped],
+    }
+
+
+def _matches(full_name: str, pattern: str) -> bool:
+    return fnmatch(full_name, pattern) or fnmatch(full_name.rpartition('/')[2], pattern)

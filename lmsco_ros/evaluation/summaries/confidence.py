@@ -1,0 +1,82 @@
+# Copyright 2026 lmsco_ros contributors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""How far each tracker's score and LOST can be trusted, over a one-pass run."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from statistics import median
+
+import numpy as np
+
+from lmsco_ros.evaluation.protocols.bootstrap import Estimate, estimate, ratio_estimate
+from lmsco_ros.evaluation.protocols.confidence import auroc, auroc_terms, lost_figures
+from lmsco_ros.evaluation.run_file import EvaluationRun
+
+
+@dataclass(frozen=True)
+class ConfidenceSummary:
+    """
+    One tracker's own word in a one-pass run.
+
+    Attributes
+    ----------
+    tracker : str
+        Name.
+    auroc : Estimate
+        Chance that a frame with overlap above 0.5 has the higher score; NaN without scores.
+    departures, declared : int
+        Times a target left, and how often LOST followed before it came back.
+    delay : float
+        Median number of frames from leaving to LOST where it was declared, else NaN.
+    false_alarms : Estimate
+        False declarations of LOST per 1000 frames with a target.
+    lost_share : Estimate
+        Share of the frames with a target that were spent in LOST, justified or not.
+
+    """
+
+    tracker: str
+    auroc: Estimate
+    departures: int
+    declared: int
+    delay: float
+    false_alarms: Estimate
+    lost_share: Estimate
+
+
+def summarize_confidence(run: EvaluationRun) -> tuple[ConfidenceSummary, ...]:
+    """Return the summary of each tracker, in the order of the run."""
+    return tuple(_summarize(run, name) for name in run.trackers)
+
+
+def _summarize(run: EvaluationRun, name: str) -> ConfidenceSummary:
+    traces = run.traces[name]
+    overlaps = [sequence.overlaps(trace, in_image=False)
+                for sequence, trace in zip(run.sequences, traces)]
+    terms = auroc_terms([trace.scores for trace in traces], overlaps)
+    lost = [lost_figures(trace.lost, overlap) for trace, overlap in zip(traces, overlaps)]
+    delays = [delay for figures in lost for delay in figures.delays]
+    declared = [delay for delay in delays if delay is not None]
+    present = np.array([figures.frames_present / 1000 for figures in lost])
+    return ConfidenceSummary(
+        tracker=name,
+        auroc=estimate(lambda weights: auroc(*terms, weights), len(traces)),
+        departures=len(delays), declared=len(declared),
+        delay=median(declared) if declared else float('nan'),
+        false_alarms=ratio_estimate(
+            np.array([float(figures.false_alarms) for figures in lost]), present),
+        lost_share=ratio_estimate(
+            np.array([figures.lost_while_present / 1000 for figures in lost]), present))
