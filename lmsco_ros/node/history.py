@@ -25,7 +25,9 @@ NANOSECONDS = 1_000_000_000
 class Stamped(Protocol):
     """Anything with a time stamp."""
 
-    stamp: int
+    @property
+    def stamp(self) -> int:
+        """When it was taken, in nanoseconds."""
 
 
 F = TypeVar('F', bound=Stamped)

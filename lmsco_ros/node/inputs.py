@@ -24,6 +24,7 @@ from builtin_interfaces.msg import Time
 from geometry_msgs.msg import PolygonStamped
 from rclpy.node import Node
 from rclpy.qos import HistoryPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.subscription import Subscription
 from sensor_msgs.msg import CompressedImage, Image, RegionOfInterest
 from std_msgs.msg import Header
 
@@ -86,7 +87,7 @@ class Inputs:
         for subscription in [self._images, *self._boxes]:
             self._node.destroy_subscription(subscription)
 
-    def _subscribe_images(self, settings: Settings):
+    def _subscribe_images(self, settings: Settings) -> Subscription:
         qos = QoSProfile(
             history=HistoryPolicy.KEEP_LAST if settings.image_depth else HistoryPolicy.KEEP_ALL,
             depth=settings.image_depth,

@@ -17,6 +17,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import PolygonStamped
 from rclpy.lifecycle import LifecycleNode
@@ -68,16 +70,14 @@ class Outputs:
     def publish(self, outcome: Outcome, dropped_frames: int) -> None:
         """Say everything about one frame, what others wait for first."""
         header, result = outcome.frame.context, outcome.result
-        found = result is not None and result.state is not TrackState.LOST
-        if found:
-            self._box.publish(polygon_from_box(result.box.as_tuple(), header))
+        found = result if result is not None and result.state is not TrackState.LOST else None
+        if found is not None:
+            self._box.publish(polygon_from_box(found.box.as_tuple(), header))
         self.publish_status(frame_status(outcome, dropped_frames), header)
-        if _is_heard(self._detections):
-            self._detections.publish(detections_from_box(
-                result.box.as_tuple() if found else None, track_id=str(outcome.track_id),
-                score=result.score if found else 0.0, header=header))
+        if self._detections is not None and _is_heard(self._detections):
+            self._detections.publish(_detections(found, outcome.track_id, header))
         if _is_heard(self._marker):
-            self._marker.publish(self._outline(result, found, header))
+            self._marker.publish(self._outline(found, header))
         if result is not None and _is_heard(self._confidence):
             self._confidence.publish(message_from_confidence(
                 result.confidence_map, result.search_region.as_tuple(),
@@ -105,13 +105,13 @@ class Outputs:
         from vision_msgs.msg import Detection2DArray
         return self._publisher(Detection2DArray, 'detections')
 
-    def _outline(self, result: TrackResult | None, found: bool, header: Header) -> ImageMarker:
-        identity = {'namespace': self._node.get_name(), 'header': header}
-        if not found:
-            return marker_removal(**identity)
-        blue, green, red = (value / 255 for value in state_color(result.state))
-        return marker_from_box(result.box.as_tuple(), (red, green, blue), **identity,
-                               line_width=self.settings.marker_line_width)
+    def _outline(self, found: TrackResult | None, header: Header) -> ImageMarker:
+        namespace = self._node.get_name()
+        if found is None:
+            return marker_removal(namespace=namespace, header=header)
+        blue, green, red = (value / 255 for value in state_color(found.state))
+        return marker_from_box(found.box.as_tuple(), (red, green, blue), namespace=namespace,
+                               line_width=self.settings.marker_line_width, header=header)
 
     def _publish_overlay(self, outcome: Outcome, header: Header) -> None:
         self._frames += 1
@@ -122,5 +122,13 @@ class Outputs:
         self._overlay.publish(message_from_image(picture, encoding='bgr8', header=header))
 
 
-def _is_heard(publisher: LifecyclePublisher | None) -> bool:
-    return publisher is not None and publisher.get_subscription_count() > 0
+def _detections(found: TrackResult | None, track_id: int, header: Header) -> Any:
+    """Return the box as a detection; none while there is no target."""
+    if found is None:
+        return detections_from_box(None, header=header)
+    return detections_from_box(found.box.as_tuple(), track_id=str(track_id),
+                               score=found.score, header=header)
+
+
+def _is_heard(publisher: LifecyclePublisher) -> bool:
+    return publisher.get_subscription_count() > 0

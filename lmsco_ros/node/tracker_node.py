@@ -13,16 +13,18 @@
 # limitations under the License.
 
 
-"""The lifecycle node `lmsco_tracker`: receives images, lets the worker track, publishes."""
+"""The lifecycle node `lmsco_tracker`: parameters, transitions, services and health."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 import functools
 import sys
 import traceback
+from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray
+from rcl_interfaces.msg import SetParametersResult
 import rclpy
 from rclpy.clock import Clock, ClockType
 from rclpy.exceptions import ParameterException
@@ -30,23 +32,20 @@ from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
 from rclpy.parameter import Parameter
+from rclpy.service import Service
 from std_msgs.msg import Header
 from std_srvs.srv import SetBool, Trigger
 
 from lmsco_ros.core.errors import LMSCOError
 from lmsco_ros.node import parameters
-from lmsco_ros.node.diagnostics import HealthMonitor, refused_status, silence_warning
-from lmsco_ros.node.history import FrameHistory
-from lmsco_ros.node.inputs import Inputs
-from lmsco_ros.node.mailbox import BoundedMailbox, LatestMailbox
+from lmsco_ros.node.diagnostics import HealthMonitor, silence_warning
 from lmsco_ros.node.outputs import Outputs
 from lmsco_ros.node.parameters import Settings
+from lmsco_ros.node.session import TrackingSession
 from lmsco_ros.node.tracker_factory import make_tracker
-from lmsco_ros.node.worker import Outcome, Phase, Tracker, TrackerWorker
+from lmsco_ros.node.worker import Tracker
 from msg_adapters.status import message_from_diagnoses
 
-# A signal has to end the process within a second, whatever the tracker is at.
-_STOP_SECONDS = 0.6
 _HEALTH_PERIOD = 1.0
 _NOT_ACTIVE = 'the node is not active; activate it first'
 
@@ -84,21 +83,22 @@ class TrackerNode(LifecycleNode):
     **kwargs
         As for `rclpy.lifecycle.LifecycleNode`: context, parameter_overrides, ...
 
+    Raises
+    ------
+    rclpy.exceptions.ParameterException
+        When a parameter is given a value that it cannot have.
+
     """
 
     def __init__(self, node_name: str = 'lmsco_tracker', *,
                  tracker_factory: Callable[[Settings], Tracker] = make_tracker,
-                 **kwargs) -> None:
+                 **kwargs: Any) -> None:
         super().__init__(node_name, **kwargs)
         self._tracker_factory = tracker_factory
         self._tracker: Tracker | None = None
         self._outputs: Outputs | None = None
-        self._inputs: Inputs | None = None
-        self._worker: TrackerWorker | None = None
-        self._monitor = HealthMonitor()
-        self._served = []
-        self._health_timer = None
-        self._health_publisher = None
+        self._session: TrackingSession | None = None
+        self._served: list[Service] = []
         try:
             self.settings = parameters.declare(self)
         except ParameterException:
@@ -106,6 +106,11 @@ class TrackerNode(LifecycleNode):
             raise
         self.add_on_set_parameters_callback(self._judge_change)
         self.add_post_set_parameters_callback(self._apply_change)
+        self._monitor = HealthMonitor()
+        self._health = self.create_publisher(DiagnosticArray, '/diagnostics', 10)
+        # Health must be told while a simulated clock stands still, too.
+        self.create_timer(_HEALTH_PERIOD, self._report_health,
+                          clock=Clock(clock_type=ClockType.STEADY_TIME))
         if self.settings.autostart:
             if self.trigger_configure() == TransitionCallbackReturn.SUCCESS:
                 self.trigger_activate()
@@ -113,7 +118,7 @@ class TrackerNode(LifecycleNode):
     @property
     def is_active(self) -> bool:
         """Whether images are received and tracked."""
-        return self._worker is not None
+        return self._session is not None
 
     @_reported
     def on_configure(self, state: LifecycleState) -> TransitionCallbackReturn:
@@ -125,31 +130,21 @@ class TrackerNode(LifecycleNode):
             self.create_service(Trigger, '~/reset', self._on_reset),
             self.create_service(SetBool, '~/set_enabled', self._on_set_enabled),
         ]
-        self._health_publisher = self.create_publisher(DiagnosticArray, '/diagnostics', 10)
-        # Health must be told while a simulated clock stands still, too.
-        self._health_timer = self.create_timer(
-            _HEALTH_PERIOD, self._report_health, clock=Clock(clock_type=ClockType.STEADY_TIME))
         return super().on_configure(state)
 
     @_reported
     def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Start to receive and track."""
-        settings = self.settings
-        self._worker = TrackerWorker(
-            self._tracker, self._deliver,
-            mailbox=(LatestMailbox() if settings.frame_policy == 'latest'
-                     else BoundedMailbox(settings.queue_size)),
-            history=FrameHistory(settings.frame_history_seconds, settings.frame_history_frames))
-        self._worker.start()
-        self._monitor.restart()
-        self._inputs = Inputs(self, settings, self._worker, self._monitor, self._refuse)
-        self.get_logger().info(f'waiting for images on {self._inputs.image_topic}')
+        self._session = TrackingSession(
+            self, self.settings, self._tracker, self._outputs, self._monitor)
+        self.get_logger().info(f'waiting for images on {self._session.image_topic}')
         return super().on_activate(state)
 
     @_reported
     def on_deactivate(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Stop to receive and track; the target is dropped."""
-        if not self._stop_tracking():
+        if not self._stop_session():
+            # Its thread still uses the tracker: neither may be used again.
             self.get_logger().error('the tracker did not come back from its last frame')
             return TransitionCallbackReturn.ERROR
         return super().on_deactivate(state)
@@ -177,80 +172,57 @@ class TrackerNode(LifecycleNode):
         self._release()
         super().destroy_node()
 
-    def _stop_tracking(self) -> bool:
-        if self._inputs is not None:
-            self._inputs.close()
-            self._inputs = None
-        stopped = self._worker is None or self._worker.stop(_STOP_SECONDS)
-        self._worker = None
-        return stopped
+    def _stop_session(self) -> bool:
+        session, self._session = self._session, None
+        return session is None or session.stop()
 
     def _release(self) -> None:
-        self._stop_tracking()
+        self._stop_session()
         if self._outputs is not None:
             self._outputs.close()
             self._outputs = None
         for service in self._served:
             self.destroy_service(service)
         self._served = []
-        if self._health_timer is not None:
-            self.destroy_timer(self._health_timer)
-            self.destroy_publisher(self._health_publisher)
-            self._health_timer = self._health_publisher = None
         self._tracker = None
-
-    def _deliver(self, outcome: Outcome) -> None:
-        """Publish what became of a frame; runs in the worker's thread."""
-        try:
-            self._monitor.answered(outcome)
-            self._outputs.publish(outcome, self._worker.dropped_frames)
-            if outcome.phase is Phase.FAILED:
-                self.get_logger().error(
-                    f'the tracker failed, the target is dropped: {outcome.error}')
-            elif outcome.phase is Phase.REFUSED:
-                self.get_logger().error(outcome.error)
-        except Exception:  # noqa: B902
-            # A signal invalidates the publishers at any moment; anything else is a mistake.
-            if self.context.ok():
-                self.get_logger().error(traceback.format_exc(), throttle_duration_sec=5.0)
-
-    def _refuse(self, header: Header, reason: str) -> None:
-        """Tell that a message cannot be used."""
-        self._monitor.refused(reason)
-        self._outputs.publish_status(refused_status(
-            reason, self._worker.track_id, self._worker.dropped_frames), header)
-        self.get_logger().error(reason, throttle_duration_sec=5.0)
 
     def _on_reset(self, request: Trigger.Request,
                   response: Trigger.Response) -> Trigger.Response:
-        if self._worker is not None:
-            self._worker.reset()
-        response.success = self.is_active
-        response.message = 'the target is dropped' if self.is_active else _NOT_ACTIVE
+        response.message = _NOT_ACTIVE
+        if self._session is not None:
+            self._session.worker.reset()
+            response.success, response.message = True, 'the target is dropped'
         return response
 
     def _on_set_enabled(self, request: SetBool.Request,
                         response: SetBool.Response) -> SetBool.Response:
-        if self._worker is not None:
-            self._worker.set_enabled(request.data)
-        response.success = self.is_active
-        response.message = ('enabled' if request.data else 'disabled') if self.is_active \
-            else _NOT_ACTIVE
+        response.message = _NOT_ACTIVE
+        if self._session is not None:
+            self._session.worker.set_enabled(request.data)
+            response.success = True
+            response.message = 'enabled' if request.data else 'disabled'
         return response
 
     def _report_health(self) -> None:
-        warning, silence = '' if self.is_active else 'inactive', self._monitor.silence()
-        if self._inputs is not None and silence > self.settings.no_image_timeout:
-            topic = self._inputs.image_topic
-            warning = silence_warning(silence, topic, self.count_publishers(topic))
-            self.get_logger().warning(warning, throttle_duration_sec=10.0)
-        dropped = self._worker.dropped_frames if self._worker is not None else 0
+        warning, dropped = 'the node is not active', 0
+        if self._session is not None:
+            warning, dropped = self._silence(self._session), self._session.worker.dropped_frames
         diagnosis = self._monitor.report(self.get_name(), warning=warning,
                                          dropped_frames=dropped)
         header = Header(stamp=self.get_clock().now().to_msg())
-        self._health_publisher.publish(message_from_diagnoses([diagnosis], header))
+        self._health.publish(message_from_diagnoses([diagnosis], header))
 
-    def _judge_change(self, changes: list[Parameter]):
+    def _silence(self, session: TrackingSession) -> str:
+        """Return a warning, and log it, when images have not come for too long."""
+        silence = self._monitor.silence()
+        if silence <= self.settings.no_image_timeout:
+            return ''
+        topic = session.image_topic
+        warning = silence_warning(silence, topic, self.count_publishers(topic))
+        self.get_logger().warning(warning, throttle_duration_sec=10.0)
+        return warning
+
+    def _judge_change(self, changes: list[Parameter]) -> SetParametersResult:
         return parameters.judge_change(changes, configured=self._tracker is not None)
 
     def _apply_change(self, changes: list[Parameter]) -> None:
@@ -259,7 +231,7 @@ class TrackerNode(LifecycleNode):
             self._outputs.settings = self.settings
 
 
-def main(args: Sequence[str] | None = None) -> int:
+def main(args: list[str] | None = None) -> int:
     """Run the node until a signal comes; return the exit code."""
     rclpy.init(args=args)
     node = None

@@ -146,11 +146,20 @@ class _Enable:
 
 @dataclass(frozen=True)
 class _Request:
-    """A start that waits for its frame; any frame will do without a stamp."""
+    """A start that waits for its frame; without a stamp any frame will do."""
 
     box: BoundingBox
     stamp: int | None
     made: float
+
+    def wants(self, frame: Frame) -> bool:
+        """Tell whether the frame is the one to start on."""
+        return self.stamp is None or frame.stamp == self.stamp
+
+    def has_missed(self, frame: Frame, patience: float) -> bool:
+        """Tell from a later frame whether the one to start on will not come any more."""
+        return self.stamp is not None and (
+            frame.stamp > self.stamp or frame.received - self.made > patience)
 
 
 class TrackerWorker:
@@ -232,11 +241,11 @@ class TrackerWorker:
         with self._intake:
             self._history.add(frame)
             request = self._request
-            if request is not None and request.stamp in (None, frame.stamp):
+            if request is not None and request.wants(frame):
                 self._request = None
                 self._mailbox.put(_Start(frame, request.box, live=True))
                 return
-            if request is not None and self._is_missed(request, frame):
+            if request is not None and request.has_missed(frame, self._history.seconds):
                 self._request = None
                 self._mailbox.put(_Refuse(frame, _unknown_stamp(request.stamp, self._history)))
             self._dropped += self._mailbox.put_frame(_Step(frame))
@@ -290,11 +299,6 @@ class TrackerWorker:
         self._request = None
         self._mailbox.supersede(
             lambda item: isinstance(item, (_Step, _Start)) and not item.live)
-
-    def _is_missed(self, request: _Request, frame: Frame) -> bool:
-        """Tell whether the frame that a start waits for will not come any more."""
-        waited = frame.received - request.made
-        return frame.stamp > request.stamp or waited > self._history.seconds
 
     def _run(self) -> None:
         handlers = {_Step: self._step, _Start: self._begin, _Refuse: self._refuse,

@@ -67,7 +67,7 @@ def test_whole_circle_frees_everything_and_tracks_again(graph):
         count = len(boxes)
         images.publish(graph.image())
         graph.spin_until(lambda: len(boxes) > count)
-        worker = node._worker
+        worker = node._session.worker
         assert change(graph, Transition.TRANSITION_DEACTIVATE)
         assert entities(node) == inactive and not worker._thread.is_alive()
         assert change(graph, Transition.TRANSITION_CLEANUP)
@@ -95,7 +95,7 @@ def test_shutdown_from_every_state(graph):
     empty = entities(node)
     node.trigger_configure()
     node.trigger_activate()
-    worker = node._worker
+    worker = node._session.worker
     assert change(graph, Transition.TRANSITION_ACTIVE_SHUTDOWN)
     assert state(graph) == State.PRIMARY_STATE_FINALIZED
     assert entities(node) == empty and not worker._thread.is_alive()
@@ -120,7 +120,7 @@ def test_error_while_activating_frees_everything(graph, monkeypatch):
     node = graph.start_tracker(autostart=False)
     unconfigured = entities(node)
     node.trigger_configure()
-    monkeypatch.delattr('lmsco_ros.node.tracker_node.Inputs')
+    monkeypatch.delattr('lmsco_ros.node.session.Inputs')
     assert node.trigger_activate() == TransitionCallbackReturn.ERROR
     assert state(graph) == State.PRIMARY_STATE_UNCONFIGURED
     assert entities(node) == unconfigured and not node.is_active
