@@ -135,6 +135,6 @@ def _line(job: Job, outcome: Outcome) -> str:
     if isinstance(outcome, Unreadable):
         return f'{where} skipped: {outcome.reason}'
     rate = outcome.updates / outcome.wall_seconds if outcome.wall_seconds else 0.0
-    failures = f', {len(outcome.failures)} failures' if outcome.failures else ''
+    failures = f', failures: {len(outcome.failures)}' if outcome.failures else ''
     crash = f', crashed: {outcome.error}' if outcome.error else ''
     return f'{where} {rate:7.1f} frames/s{failures}{crash}'

@@ -190,7 +190,8 @@ def _failures(run: EvaluationRun, sequences: Mapping[str, TrackingSequence],
         images = sequences.get(info.full_name)
         if images is not None:
             trace = run.traces[failure.tracker][failure.sequence]
-            strip = failure_strip(images, trace, failure.frames, colors[failure.tracker])
+            strip = failure_strip(images.frames, info.ground_truth, trace.boxes, failure.frames,
+                                  colors[failure.tracker])
             name = f'failure_{failure.tracker}_{info.group}_{info.name}.png'
             (folder / name).write_bytes(encode(strip, '.png'))
             yield {'tracker': failure.tracker, 'sequence': info.full_name,

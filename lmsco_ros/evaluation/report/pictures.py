@@ -25,10 +25,11 @@ import numpy as np
 import numpy.typing as npt
 
 from lmsco_ros.evaluation.datasets import TrackingSequence
+from lmsco_ros.evaluation.datasets.frames import FrameSource
 from lmsco_ros.evaluation.geometry import is_absent
-from lmsco_ros.evaluation.trace import Trace
 
 Picture = npt.NDArray[np.uint8]
+Boxes = npt.NDArray[np.float64]
 
 TRUTH_COLOR = '#4cff6a'
 _THUMBNAIL = (132, 100)
@@ -38,10 +39,11 @@ _GAP = 4
 
 @dataclass(frozen=True)
 class _Mark:
-    """A box to be drawn and its color as `#rrggbb`."""
+    """A box to be drawn, its color as `#rrggbb` and the width of the line."""
 
-    box: npt.NDArray[np.float64]
+    box: Boxes
     color: str
+    line: int = 1
 
 
 def thumbnail(sequence: TrackingSequence) -> Picture:
@@ -52,17 +54,17 @@ def thumbnail(sequence: TrackingSequence) -> Picture:
                   _THUMBNAIL)
 
 
-def failure_strip(sequence: TrackingSequence, trace: Trace, frames: Sequence[int],
+def failure_strip(images: FrameSource, truth: Boxes, answers: Boxes, frames: Sequence[int],
                   color: str) -> Picture:
     """
     Return pictures of some frames side by side.
 
     Parameters
     ----------
-    sequence : TrackingSequence
-        Images and true boxes (drawn in `TRUTH_COLOR`).
-    trace : Trace
-        The tracker's boxes, drawn in `color`.
+    images : FrameSource
+        Images of the sequence.
+    truth, answers : ndarray, shape (n, 4)
+        True boxes, drawn in `TRUTH_COLOR`, and the tracker's, drawn in `color`.
     frames : sequence of int
         Frames to show; each picture is cut to where the two boxes are.
     color : str
@@ -76,10 +78,9 @@ def failure_strip(sequence: TrackingSequence, trace: Trace, frames: Sequence[int
     """
     panels = []
     for index in frames:
-        truth, answer = sequence.ground_truth[index], trace.boxes[index]
-        view = _display(sequence.frames[index])
-        marks = [_Mark(truth, TRUTH_COLOR), _Mark(answer, color)]
-        panel = _panel(view, _region(view, [truth, answer]), marks, _PANEL)
+        view = _display(images[index])
+        marks = [_Mark(answers[index], color, line=2), _Mark(truth[index], TRUTH_COLOR)]
+        panel = _panel(view, _region(view, [mark.box for mark in marks]), marks, _PANEL)
         _caption(panel, f'{index}')
         panels += [panel, np.full((_PANEL[1], _GAP, 3), 255, np.uint8)]
     return np.hstack(panels[:-1])
@@ -131,7 +132,8 @@ def _panel(view: Picture, region: npt.NDArray[np.float64], marks: list[_Mark],
         if np.isfinite(mark.box).all():
             low = np.round(mark.box[:2] * scale + offset).astype(int)
             high = np.round((mark.box[:2] + mark.box[2:]) * scale + offset).astype(int)
-            cv2.rectangle(panel, low.tolist(), high.tolist(), _bgr(mark.color), 1, cv2.LINE_AA)
+            cv2.rectangle(panel, low.tolist(), high.tolist(), _bgr(mark.color), mark.line,
+                          cv2.LINE_AA)
     return panel
 
 

@@ -1,0 +1,90 @@
+# Copyright 2026 lmsco_ros contributors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The two commands, from the command line to the files they leave."""
+
+import pytest
+import typer
+from typer.testing import CliRunner
+
+from lmsco_ros.cli.evaluate import register
+
+TRACK, MISS = 0, 1
+
+
+@pytest.fixture
+def lmsco():
+    """Return a function that runs the commands of this module."""
+    app = typer.Typer()
+    register(app)
+
+    def run(*words):
+        return CliRunner().invoke(app, [str(word) for word in words])
+    return run
+
+
+@pytest.fixture
+def dataset(tmp_path, vot_folder):
+    """Return a folder of two good sequences and one that is broken."""
+    root = tmp_path / 'data'
+    vot_folder(root / 'vot_tir' / 'steady', [TRACK] * 12)
+    vot_folder(root / 'vot_tir' / 'rough', [TRACK, TRACK, MISS] + [TRACK] * 9)
+    (vot_folder(root / 'vot_tir' / 'torn', [TRACK] * 3) / 'ir' / '00000002.png').unlink()
+    return root
+
+
+def test_evaluate_then_results(lmsco, dataset, scripted, tmp_path):
+    output = tmp_path / 'out'
+    common = ('evaluate', dataset, '--tracker', scripted, '--output', output)
+    first = lmsco(*common, '--jobs', 2)
+    assert first.exit_code == 0, first.output
+    assert 'skipped vot_tir/torn: 2 frames but 3 rows' in first.output
+    page = (output / 'report.html').read_text(encoding='utf-8')
+    assert 'steady' in page and 'rough' in page and 'torn' in page
+    second = lmsco(*common)
+    assert '2 results are there already, 0 to go' in second.output
+    third = lmsco(*common, '--protocol', 'vot')
+    assert 'failures: 1' in third.output
+    assert 'id="supervised"' in (output / 'report.html').read_text(encoding='utf-8')
+    table = tmp_path / 'docs' / 'results.md'
+    written = lmsco('results', output, '--page', table)
+    assert written.exit_code == 0, written.output
+    assert '| Scripted |' in table.read_text(encoding='utf-8')
+
+
+def test_sequences_and_frames_narrow_the_work(lmsco, dataset, scripted, tmp_path):
+    output = tmp_path / 'out'
+    result = lmsco('evaluate', dataset, '--tracker', scripted, '--output', output,
+                   '--sequences', 'ste*', '--frames', 5)
+    assert result.exit_code == 0, result.output
+    assert [path.parent.name for path in output.rglob('records/**/*.json')] == ['Scripted']
+    assert 'torn' not in result.output
+
+
+@pytest.mark.parametrize(('words', 'reason'), [
+    (('--tracker', 'nobody'), 'there is no tracker'),
+    (('--sequences', 'nothing'), 'no usable sequence'),
+    (('--split', 'test'), 'no sequence of this dataset'),
+])
+def test_mistakes_are_told_in_one_line(lmsco, dataset, scripted, tmp_path, words, reason):
+    trackers = () if '--tracker' in words else ('--tracker', scripted)
+    result = lmsco('evaluate', dataset, '--output', tmp_path / 'out', *trackers, *words)
+    assert result.exit_code == 1
+    assert reason in result.output and 'Traceback' not in result.output
+
+
+def test_results_of_nothing_is_an_error(lmsco, tmp_path):
+    result = lmsco('results', tmp_path)
+    assert result.exit_code == 1
+    assert 'no results in' in result.output

@@ -1,0 +1,190 @@
+# Copyright 2026 lmsco_ros contributors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The page is whole, self-contained, and holds everything that was run."""
+
+from html.parser import HTMLParser
+
+import numpy as np
+import pytest
+
+from lmsco_ros.evaluation.datasets import scan_dataset
+from lmsco_ros.evaluation.protocols.bootstrap import Estimate
+from lmsco_ros.evaluation.report.conditions import command_line
+from lmsco_ros.evaluation.report.failures import worst_failures
+from lmsco_ros.evaluation.report.formatting import interval, is_real, number, signed
+from lmsco_ros.evaluation.report.page import write_report
+from lmsco_ros.evaluation.report.pictures import encode, failure_strip, thumbnail
+from lmsco_ros.evaluation.results_page import results_page
+from lmsco_ros.evaluation.run_file import EvaluationRun, read_run, SequenceInfo, write_run
+from lmsco_ros.evaluation.trace import Trace
+
+VOID = {'meta', 'img', 'rect', 'line', 'br', 'link'}
+TRACKERS = ('hcs', 'csrt', 'lazy')
+
+
+class Page(HTMLParser):
+    """Collects text and references, and checks that tags are closed in order."""
+
+    def __init__(self):
+        super().__init__()
+        self.open, self.text, self.references, self.images = [], [], [], 0
+
+    def handle_starttag(self, tag, attributes):
+        values = dict(attributes)
+        self.references += [values[key] for key in ('src', 'href', 'data') if key in values]
+        self.images += tag == 'img'
+        if tag not in VOID:
+            self.open.append(tag)
+
+    def handle_endtag(self, tag):
+        if tag not in VOID:
+            assert self.open.pop() == tag
+
+    def handle_data(self, data):
+        self.text.append(data)
+
+
+def answers(truth, tracker, protocol):
+    """Return what a tracker does: follow, follow with a lag, or not move at all."""
+    frames = len(truth)
+    boxes = truth.copy()
+    if tracker == 'csrt':
+        boxes[1:] = truth[:-1]
+    lazy = tracker == 'lazy'
+    if lazy:
+        boxes[:] = truth[0]
+    supervised = protocol == 'vot' and lazy
+    return Trace(boxes, np.linspace(1, .5, frames), np.arange(frames) > frames - 3 if lazy
+                 else np.zeros(frames, bool), starts=(0, 17) if supervised else (0,),
+                 failures=(12,) if supervised else (), updates=frames - 1, cpu_seconds=.5,
+                 wall_seconds=.6, error='frame 9: stumbled' if lazy else None)
+
+
+@pytest.fixture
+def sequences(tmp_path, vot_folder):
+    """Return two sequences with attributes, in two groups."""
+    for group, name in (('vot_tir', 'birds'), ('drone_ir', 'a<b>&c')):
+        folder = vot_folder(tmp_path / 'data' / group / name, [0] * 24)
+        (folder / 'camera_motion.tag').write_text('1\n' * 12, encoding='utf-8')
+    return scan_dataset(tmp_path / 'data').sequences
+
+
+@pytest.fixture
+def runs(sequences):
+    """Return a run under each protocol."""
+    infos = tuple(SequenceInfo(item.name, item.group, (64, 48), item.ground_truth,
+                               item.attributes) for item in sequences)
+    context = {'dataset': 'thermal', 'split': 'test', 'jobs': 2, 'date': '2026-01-01',
+               'machine': {'processor': 'Abacus 3000', 'cores': '2'},
+               'versions': {'numpy': '9.9'},
+               'skipped': [{'name': 'x/broken', 'reason': 'no frames'}]}
+    return {protocol: EvaluationRun(
+        protocol, infos,
+        {name: tuple(answers(info.ground_truth, name, protocol) for info in infos)
+         for name in TRACKERS}, context) for protocol in ('ope', 'vot')}
+
+
+@pytest.fixture
+def parse(tmp_path, sequences):
+    """Return a function that writes the report of runs and parses it."""
+    def write(runs):
+        path = write_report(tmp_path, runs, {item.full_name: item for item in sequences})
+        page = Page()
+        page.feed(path.read_text(encoding='utf-8'))
+        assert page.open == []
+        return page
+    return write
+
+
+def test_page_holds_every_tracker_and_sequence_and_refers_to_nothing_outside(parse, runs):
+    page = parse(runs)
+    text = ' '.join(page.text)
+    for name in (*TRACKERS, 'birds', 'a<b>&c', 'camera motion', 'Abacus 3000', '2026-01-01'):
+        assert name in text
+    assert 'skipped x/broken: no frames' in text
+    assert 'lazy crashed on vot_tir/birds: frame 9: stumbled' in text
+    assert all(reference.startswith(('data:image/', '#')) for reference in page.references)
+    # Eight plots, two thumbnails, and the strips of the tracker that never moved.
+    assert page.images == 8 + 2 + 2
+
+
+@pytest.mark.parametrize('protocol', ['ope', 'vot'])
+def test_page_of_one_protocol_alone(parse, runs, protocol):
+    page = parse({protocol: runs[protocol]})
+    assert page.images == 4 + 2 + 2
+    anchors = [item for item in page.references if item.startswith('#')]
+    assert ('#one-pass' in anchors) == (protocol == 'ope')
+
+
+def test_plots_and_strips_are_files_beside_the_page(parse, runs, tmp_path):
+    parse(runs)
+    names = {path.stem for path in (tmp_path / 'pictures').glob('*.png')}
+    assert {'success', 'precision', 'normalized_precision', 'speed', 'ar_raw', 'ar_rank',
+            'eao_curve', 'eao_order', 'failure_lazy_vot_tir_birds'} <= names
+
+
+def test_only_the_tracker_that_fails_is_shown_failing(runs):
+    found = worst_failures(runs['ope'])
+    assert {item.tracker for item in found} == {'lazy'}
+    # Ten pixels wide and one pixel a frame: overlap falls below a tenth at frame 9.
+    assert found[0].frames == (0, 4, 9, 14, 23)
+
+
+def test_pictures_mark_truth_and_answer(sequences):
+    truth = sequences[0].ground_truth
+    strip = failure_strip(sequences[0].frames, truth, truth + (6, 6, 0, 0), (2, 5), '#ff0000')
+    assert strip.shape == (160, 2 * 210 + 4, 3)
+    levels = strip.astype(int)
+    green = (levels[..., 1] > 150) & (levels[..., 2] < 120)
+    red = (levels[..., 2] > 150) & (levels[..., 1] < 80)
+    assert green.sum() > 40 and red.sum() > 40
+    assert thumbnail(sequences[0]).shape == (100, 132, 3)
+    assert encode(strip, '.png')[1:4] == b'PNG'
+
+
+def test_command_can_be_repeated(runs):
+    assert command_line(runs['vot']) == (
+        'lmsco evaluate thermal --protocol vot --split test --tracker hcs --tracker csrt '
+        '--tracker lazy --jobs 2 --output results')
+
+
+def test_results_page_has_a_table_for_each_kind_of_scene(tmp_path, runs):
+    from lmsco_ros.evaluation.record_store import write_json
+    for protocol, run in runs.items():
+        for name, traces in run.traces.items():
+            for info, trace in zip(run.sequences, traces):
+                write_json(tmp_path / f'{protocol}-{name}-{info.group}.json', trace.to_json())
+        write_run(tmp_path, protocol, run.sequences,
+                  {name: [f'{protocol}-{name}-{info.group}.json' for info in run.sequences]
+                   for name in TRACKERS}, run.context)
+    text = results_page([tmp_path])
+    titles = [line for line in text.splitlines() if line.startswith('## ')]
+    assert titles == ['## Ground-level (vot_tir, ptb_tir)', '## Aerial (anti_uav_ir, drone_ir)',
+                      '## All sequences', '## Conditions']
+    assert 'What this is not' in text and 'need the full benchmarks' in text
+    assert '| csrt | ' in text and 'Abacus 3000' in text
+    assert str(tmp_path) not in text
+    again = read_run(tmp_path, 'vot')
+    assert again.traces['lazy'][0].failures == (12,)
+    assert np.allclose(again.traces['csrt'][1].boxes, runs['vot'].traces['csrt'][1].boxes)
+
+
+def test_figures_as_text():
+    assert number(.5) == '.500' and number(float('nan')) == '–' and number(12.345, 1) == '12.3'
+    assert number(-.25) == '−.250'
+    assert interval(Estimate(.5, .4, .6)) == '.400 – .600'
+    assert interval(Estimate(.5, float('nan'), float('nan'))) == ''
+    assert signed(Estimate(.1, .05, .2)) == '+.100'
+    assert is_real(Estimate(.1, .05, .2)) and not is_real(Estimate(.1, -.05, .2))

@@ -1,0 +1,131 @@
+# Copyright 2026 lmsco_ros contributors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Figures of whole runs against hand-computed values."""
+
+import math
+
+import numpy as np
+import pytest
+
+from lmsco_ros.evaluation.protocols.bootstrap import Estimate
+from lmsco_ros.evaluation.run_file import EvaluationRun, SequenceInfo
+from lmsco_ros.evaluation.summaries.attributes import attribute_names, summarize_attributes
+from lmsco_ros.evaluation.summaries.confidence import summarize_confidence
+from lmsco_ros.evaluation.summaries.differences import differences, reference_of
+from lmsco_ros.evaluation.summaries.one_pass import summarize_one_pass
+from lmsco_ros.evaluation.summaries.supervised import eao_interval, summarize_supervised
+from lmsco_ros.evaluation.trace import Trace
+
+
+def sequence(name, frames, attributes=None):
+    """Return a sequence with a target that stands still."""
+    truth = np.tile([10., 10, 10, 10], (frames, 1))
+    return SequenceInfo(name, 'group', (100, 100), truth, attributes or {})
+
+
+def trace(overlaps, starts=(0,), failures=(), scores=None, lost=(), seconds=1.0):
+    """Return answers that overlap the target as stated (a box of that height, 0: none)."""
+    boxes = np.array([[10, 10, 10, 10 * value] if value else [50, 50, 10, 10]
+                      for value in overlaps], dtype=float)
+    marks = np.zeros(len(overlaps), bool)
+    marks[list(lost)] = True
+    return Trace(boxes, np.array(scores if scores else [np.nan] * len(overlaps)), marks, starts,
+                 failures, updates=len(overlaps) - 1, cpu_seconds=seconds,
+                 wall_seconds=2 * seconds)
+
+
+def test_one_pass_means_are_over_sequences_and_rates_over_frames():
+    run = EvaluationRun('ope', (sequence('a', 2), sequence('b', 4)), {
+        'one': (trace([1, 1]), trace([.5] * 4, seconds=3))})
+    (summary,) = summarize_one_pass(run)
+    # Overlap 1 lies above 20 of 21 thresholds, overlap .5 above 10.
+    assert summary.success_auc.value == pytest.approx((20 / 21 + 10 / 21) / 2)
+    assert summary.cpu_rate.value == pytest.approx((1 + 3) / (1 + 3))
+    assert summary.wall_rate.value == pytest.approx(4 / 8)
+    assert summary.crashes == ()
+
+
+def test_supervised_figures_by_hand():
+    perfect = [1] * 20
+    broken = [1] * 12 + [0] + [0] * 4 + [1] * 3
+    run = EvaluationRun('vot', (sequence('a', 20), sequence('b', 20)), {
+        'good': (trace(perfect), trace([.5] * 20)),
+        'bad': (trace(broken, (0, 17), (12,)), trace([.5] * 20))})
+    good, bad = summarize_supervised(run)
+    assert good.accuracies.tolist() == [1, .5]
+    assert bad.accuracies.tolist() == [1, .5]
+    assert bad.failures.tolist() == [1, 0]
+    assert bad.failures_per_100_frames.value == pytest.approx(100 / 40)
+    assert bad.reliability.value == pytest.approx(math.exp(-30 / 40))
+    assert bad.reliability.low <= bad.reliability.value <= bad.reliability.high
+    assert (good.robustness_rank, bad.robustness_rank) == (1.25, 1.75)
+    assert good.accuracy_rank == bad.accuracy_rank == 1.5
+    # The longest sequence has 20 frames: the interval shrinks to that one length. There
+    # the failed fragment counts 11 of 19 frames, the still one .5, the last says nothing.
+    assert eao_interval(run) == (20, 20)
+    assert good.eao.value == pytest.approx(.75)
+    assert bad.eao.value == pytest.approx((11 / 19 + .5) / 2)
+
+
+def test_python_convention_forgets_what_comes_after_the_longest_fragment():
+    overlaps = [1] * 5 + [0] * 5
+    run = EvaluationRun('vot', (sequence('a', 40),), {
+        'weak': (trace(overlaps * 4, (0, 10, 20, 30), (5, 15, 25, 35)),)})
+    (summary,) = summarize_supervised(run)
+    assert summary.eao.value < 0.15
+    assert math.isnan(summary.eao_python.value)
+
+
+def test_groups_can_be_taken_alone():
+    infos = (sequence('a', 2), SequenceInfo('b', 'other', (9, 9), np.ones((2, 4)), {}))
+    run = EvaluationRun('ope', infos, {'one': (trace([1, 1]), trace([0, 0]))})
+    part = run.only(('other',))
+    assert [item.name for item in part.sequences] == ['b']
+    assert len(part.traces['one']) == 1
+    assert run.only(None).sequences == infos
+
+
+def test_attributes_pool_annotated_sequences_only():
+    flags = {'occlusion': np.array([False, True]), 'empty': np.array([True, False])}
+    run = EvaluationRun('ope', (sequence('a', 2, flags), sequence('b', 2)), {
+        'one': (trace([1, .5]), trace([.1, .1]))})
+    assert attribute_names(run) == ('occlusion', 'empty')
+    figures = summarize_attributes(run)['one']
+    assert figures['occlusion'].mean_overlap == pytest.approx(.5)
+    assert figures['empty'].mean_overlap == pytest.approx(1)
+    assert summarize_attributes(EvaluationRun('ope', (sequence('b', 2),),
+                                              {'one': (trace([1, 1]),)})) == {}
+
+
+def test_confidence_pools_sequences():
+    run = EvaluationRun('ope', (sequence('a', 2), sequence('b', 2)), {
+        'one': (trace([1, .1], scores=[.9, .3]), trace([1, 1], scores=[.8, .2], lost=[1]))})
+    (summary,) = summarize_confidence(run)
+    assert summary.auroc.value == pytest.approx(2 / 3)
+    assert summary.false_alarms.value == pytest.approx(1000 / 4)
+    assert summary.lost_share.value == pytest.approx(1 / 4)
+    assert summary.departures == 0 and math.isnan(summary.delay)
+
+
+def test_differences_are_to_csrt_or_the_first():
+    assert reference_of(('hcs',)) is None
+    assert reference_of(('hcs', 'kcf')) == 'hcs'
+    figures = {'hcs': np.array([.9, .8, .3]), 'csrt': np.array([.5, .5, .4])}
+    (row,) = differences(figures, higher_is_better=True)
+    assert (row.tracker, row.reference, row.better, row.worse) == ('hcs', 'csrt', 2, 1)
+    assert row.difference.value == pytest.approx((.4 + .3 - .1) / 3)
+    (reverse,) = differences(figures, higher_is_better=False)
+    assert (reverse.better, reverse.worse) == (1, 2)
+    assert isinstance(row.difference, Estimate)
