@@ -17,6 +17,7 @@
 import numpy as np
 import pytest
 
+from lmsco_ros.core.backend import Backend, to_numpy
 from lmsco_ros.core.fourier.series import analyze, inner
 from lmsco_ros.core.learning.memory import SampleMemory
 from lmsco_ros.core.learning.preconditioner import CoupledPreconditioner, FrequencyPreconditioner
@@ -70,12 +71,17 @@ def test_symmetric_and_positive_definite(memory, rng, kind):
 
 
 @pytest.mark.parametrize('kind', KINDS)
-def test_right_hand_side_and_memory_are_left_alone(memory, rng, kind):
-    blocks = random_blocks(rng)
-    kept = [b.copy() for b in [*blocks, *memory.mean, *memory.energy]]
+@pytest.mark.parametrize('library', ['numpy', 'torch'])
+def test_right_hand_side_and_memory_are_left_alone(samples, rng, kind, library):
+    namespace = pytest.importorskip(f'array_api_compat.{library}')
+    memory = SampleMemory(5, 0.1, SHAPES, Backend(namespace, 'cpu', 'float64'))
+    for sample in samples:
+        memory.add([namespace.asarray(block) for block in sample])
+    blocks = [namespace.asarray(block) for block in random_blocks(rng)]
+    kept = [to_numpy(b).copy() for b in [*blocks, *memory.mean, *memory.energy]]
     kind(memory, MARGIN_WEIGHT, WINDOW_ENERGY).apply(blocks)
     for before, after in zip(kept, [*blocks, *memory.mean, *memory.energy], strict=True):
-        np.testing.assert_array_equal(before, after)
+        np.testing.assert_array_equal(before, to_numpy(after))
 
 
 def test_frequencies_are_inverted_one_by_one(memory, samples, rng):
