@@ -24,8 +24,10 @@ median and the 95th percentile, of every repetition and the best of each, of
 - end to end: from the camera's publish call to the box heard, less the tracker's time; this
   holds both deliveries and what this process adds.
 
-With `real` the default tracker works, and frames that wait for it count; with `instant` the
-node is alone. Run on an otherwise idle machine, with the package on the path:
+With `real` the default tracker works; frames that came while it was still at the one before
+are counted as waiting and left out, for their delay is the tracker's. With `instant` the node
+is alone. With `echo` a bare node answers every image with a fixed box: what ROS itself costs.
+Run on an otherwise idle machine, with the package on the path:
 python benchmarks/node_overhead.py [--frames N] [--repetitions N]
 """
 
@@ -53,8 +55,9 @@ from sensor_msgs.msg import Image, RegionOfInterest
 from lmsco_ros.core import BoundingBox, TrackResult, TrackState
 from lmsco_ros.node.tracker_factory import make_tracker
 from lmsco_ros.node.tracker_node import TrackerNode
+from msg_adapters.boxes import polygon_from_box
 from msg_adapters.image import message_from_image
-from msg_adapters.status import FrameStatus, status_from_message
+from msg_adapters.status import FrameStatus, message_from_status, status_from_message
 
 PROFILE = Path(__file__).resolve().parents[1] / 'config' / 'fastdds_large_images.xml'
 SHAPE = (512, 640)
@@ -77,7 +80,27 @@ class InstantTracker:
                            np.zeros((2, 2), np.float32), self._box)
 
 
-TRACKERS = {'real': make_tracker, 'instant': lambda settings: InstantTracker()}
+class Echo(Node):
+    """Answers every image as the tracker node does, and does nothing else."""
+
+    def __init__(self) -> None:
+        super().__init__('lmsco_tracker')
+        self._box = self.create_publisher(PolygonStamped, '~/box', 10)
+        self._status = self.create_publisher(DiagnosticArray, '~/status', 10)
+        self.create_subscription(Image, 'image_raw', self._on_image, qos_profile_sensor_data)
+        self.create_subscription(RegionOfInterest, 'init_box', lambda region: None, 10)
+
+    def _on_image(self, message: Image) -> None:
+        self._box.publish(polygon_from_box(BOX, message.header))
+        self._status.publish(message_from_status(
+            FrameStatus('tracking', 1, 1.0, 0.0, 0.0, 0), self.get_name(), message.header))
+
+
+NODES = {
+    'real': lambda: TrackerNode(tracker_factory=make_tracker),
+    'instant': lambda: TrackerNode(tracker_factory=lambda settings: InstantTracker()),
+    'echo': Echo,
+}
 
 
 class Camera(Node):
@@ -114,12 +137,18 @@ class Camera(Node):
         self.statuses[_nanoseconds(message)] = status_from_message(message)
 
     def figures(self) -> np.ndarray:
-        """Return milliseconds (inside, end to end, tracker), one row for each answered frame."""
+        """
+        Return one row for each answered frame.
+
+        Columns are milliseconds inside, end to end and of the tracker, and whether the frame
+        had to wait for the one before.
+        """
         stamps = sorted(self.heard.keys() & self.statuses.keys())[WARM_UP:]
         return np.array([(
             self.statuses[s].latency_ms - self.statuses[s].tracker_ms,
             1e3 * (self.heard[s] - self.sent[s]) - self.statuses[s].tracker_ms,
-            self.statuses[s].tracker_ms) for s in stamps])
+            self.statuses[s].tracker_ms,
+            self.heard[before] > self.sent[s]) for before, s in zip(stamps, stamps[1:])])
 
 
 def _nanoseconds(message: PolygonStamped | DiagnosticArray) -> int:
@@ -137,10 +166,10 @@ def _scene() -> np.ndarray:
             + noise).astype(np.uint16)
 
 
-def run_node(tracker: str) -> None:
+def run_node(name: str) -> None:
     """Be the node's process."""
     rclpy.init()
-    node = TrackerNode(tracker_factory=TRACKERS[tracker])
+    node = NODES[name]()
     executor = SingleThreadedExecutor()
     executor.add_node(node)
     with contextlib.suppress(KeyboardInterrupt, ExternalShutdownException):
@@ -150,9 +179,9 @@ def run_node(tracker: str) -> None:
 
 
 @contextlib.contextmanager
-def node_process(tracker: str) -> Iterator[None]:
+def node_process(name: str) -> Iterator[None]:
     """Run the node beside this process."""
-    process = subprocess.Popen([sys.executable, __file__, '--node', tracker],
+    process = subprocess.Popen([sys.executable, __file__, '--node', name],
                                stderr=subprocess.DEVNULL)
     try:
         yield
@@ -161,10 +190,10 @@ def node_process(tracker: str) -> Iterator[None]:
         process.wait()
 
 
-def measure(tracker: str, frames: int) -> np.ndarray:
+def measure(name: str, frames: int) -> np.ndarray:
     """Run once and return the figures of every answered frame."""
     camera = Camera(frames)
-    with node_process(tracker):
+    with node_process(name):
         while camera.remaining > 0:
             rclpy.spin_once(camera)
     camera.destroy_node()
@@ -176,7 +205,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[1])
     parser.add_argument('--frames', type=int, default=300)
     parser.add_argument('--repetitions', type=int, default=3)
-    parser.add_argument('--node', choices=TRACKERS, help='be the node (used internally)')
+    parser.add_argument('--node', choices=NODES, help='be the node (used internally)')
     options = parser.parse_args()
     os.environ.setdefault('ROS_AUTOMATIC_DISCOVERY_RANGE', 'LOCALHOST')
     if options.node:
@@ -184,14 +213,15 @@ def main() -> None:
         return
     os.environ.setdefault('FASTRTPS_DEFAULT_PROFILES_FILE', str(PROFILE))
     rclpy.init()
-    for tracker in TRACKERS:
+    for name in NODES:
         rows = []
         for _ in range(options.repetitions):
-            figures = measure(tracker, options.frames)
-            rows.append(np.percentile(figures, [50, 95], axis=0)[:, :2].T.ravel())
-            print(f'{tracker}: {_sentence(rows[-1])}; tracker {np.median(figures[:, 2]):.1f} ms, '
-                  f'{len(figures)} of {options.frames} frames', flush=True)
-        print(f'{tracker}, best of {options.repetitions}: {_sentence(np.min(rows, axis=0))}')
+            figures = measure(name, options.frames)
+            waited = figures[:, 3] > 0
+            rows.append(np.percentile(figures[~waited, :2], [50, 95], axis=0).T.ravel())
+            print(f'{name}: {_sentence(rows[-1])}; tracker {np.median(figures[:, 2]):.1f} ms; '
+                  f'{len(figures)} frames, {np.sum(waited)} waiting', flush=True)
+        print(f'{name}, best of {options.repetitions}: {_sentence(np.min(rows, axis=0))}')
     rclpy.shutdown()
 
 
