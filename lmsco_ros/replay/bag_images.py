@@ -29,10 +29,8 @@ from rosbags.typesys import get_typestore, Stores
 from lmsco_ros.replay.errors import SourceError
 from lmsco_ros.replay.frame import Frame
 from msg_adapters.errors import MessageError
-from msg_adapters.image import image_from_compressed, image_from_message
 
 RAW, COMPRESSED = 'sensor_msgs/msg/Image', 'sensor_msgs/msg/CompressedImage'
-_DECODERS = {RAW: image_from_message, COMPRESSED: image_from_compressed}
 _BAG_SUFFIXES = ('.mcap', '.db3')
 _DEFAULT_FPS = 30.0
 
@@ -90,7 +88,7 @@ def choose_connection(reader: AnyReader, path: Path, topic: str) -> Connection:
         When there is no such image topic, or several to choose from.
 
     """
-    images = {c.topic: c for c in reader.connections if c.msgtype in _DECODERS}
+    images = {c.topic: c for c in reader.connections if c.msgtype in (RAW, COMPRESSED)}
     names = ', '.join(sorted(images))
     if not images:
         others = ', '.join(sorted({c.topic for c in reader.connections})) or 'nothing'
@@ -148,9 +146,12 @@ class BagImages:
 
     def __iter__(self) -> Iterator[Frame]:
         """Yield the frames, with the stamps of their headers where these are set."""
+        # Folders and videos are read through the same door, and need no messages.
+        from msg_adapters.image import image_from_compressed, image_from_message
+
         with open_bag(self._path) as reader:
             connection = choose_connection(reader, self._path, self.topic)
-            decode = _DECODERS[connection.msgtype]
+            decode = image_from_message if connection.msgtype == RAW else image_from_compressed
             messages = reader.messages([connection])
             for index, (_, logged, data) in enumerate(messages):
                 message = reader.deserialize(data, connection.msgtype)

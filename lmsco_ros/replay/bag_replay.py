@@ -36,8 +36,8 @@ from lmsco_ros.replay.node_session import Heard, NODE_NAME, NodeSession, OUTPUTS
 from lmsco_ros.replay.player import Exchange, Player
 from lmsco_ros.replay.storage import Storage
 
-# While the node tracks one frame, the next one is on its way.
-_IN_FLIGHT = 2
+# While the node tracks one frame, the next one is on its way; the start is waited for.
+_AHEAD = 1
 _LINGER_SECONDS = 0.3
 
 
@@ -114,16 +114,10 @@ def replay_bag(plan: ReplayPlan, on_begin: Callable[[int], None],
                          compressed=images.msgtype == COMPRESSED) as session, \
                 create_bag(plan.output, plan.storage) as writer:
             on_begin(min(images.msgcount, plan.frames or images.msgcount))
-            recorder = _Recorder(writer, reader, session_outputs(plan.outputs))
+            recorder = _Recorder(writer, reader, images.topic, session.outputs, plan.rate)
             player = Player(session, recorder.on_heard)
-            recorder.sent_at = player.sent_at
             _play(plan, reader, images, player, recorder, on_frame)
     return player.exchanges()
-
-
-def session_outputs(extra: tuple[str, ...]) -> tuple[str, ...]:
-    """Return the names of everything that is recorded."""
-    return tuple(dict.fromkeys(('box', 'status', *extra)))
 
 
 def _play(plan: ReplayPlan, reader: AnyReader, images: Connection, player: Player,
@@ -138,14 +132,15 @@ def _play(plan: ReplayPlan, reader: AnyReader, images: Connection, player: Playe
             if plan.rate:
                 player.listen_until(pace.moment(logged))
             else:
-                player.settle(_IN_FLIGHT - 1 if sent > 1 else 0)
+                player.settle(_AHEAD if sent > 1 else 0)
             if not sent:
                 player.start(plan.box, stamp)
-            recorder.logged[stamp] = logged
+            recorder.copy(connection, logged, data)
             player.send(stamp, data)
             sent += 1
             on_frame()
-        recorder.copy(connection, logged, data)
+        else:
+            recorder.copy(connection, logged, data)
     if plan.rate:
         player.finish()
     else:
@@ -180,14 +175,16 @@ class _Recorder:
     """
     Writes the new bag.
 
-    Answers get the time of their image plus the time that the node took, so that both
-    stay side by side whatever the speed of the replay was.
+    Answers come after their image by what the node took, on the clock of the recording:
+    at twice the rate twice as much of it passes, at rate 0 none.
     """
 
-    def __init__(self, writer: Writer, reader: AnyReader, outputs: tuple[str, ...]) -> None:
-        self.logged: dict[int, int] = {}
-        self.sent_at: Callable[[int], float | None] = lambda stamp: None
+    def __init__(self, writer: Writer, reader: AnyReader, image_topic: str,
+                 outputs: tuple[str, ...], rate: float) -> None:
         self._writer = writer
+        self._image_topic = image_topic
+        self._rate = rate
+        self._logged: dict[int, int] = {}
         store = get_typestore(Stores.ROS2_JAZZY)
         topics = {output: f'/{NODE_NAME}/{output}' for output in outputs}
         self._answers = {
@@ -200,16 +197,16 @@ class _Recorder:
 
     def copy(self, connection: Connection, logged: int, data: bytes) -> None:
         """Write an original message."""
+        if connection.topic == self._image_topic:
+            self._logged[serialized_stamp(data)] = logged
         if connection.id in self._copies:
             self._writer.write(self._copies[connection.id], logged, data)
 
-    def on_heard(self, heard: Heard) -> None:
-        """Write a message of the node, if it is about one of the images."""
-        stamp = serialized_stamp(heard.data)
-        sent = self.sent_at(stamp)
-        if sent is not None:
-            moment = self.logged[stamp] + round(1e9 * (heard.received - sent))
-            self._writer.write(self._answers[heard.output], moment, heard.data)
+    def on_heard(self, heard: Heard, stamp: int, seconds: float) -> None:
+        """Write what the node says about the image with `stamp`, `seconds` after it."""
+        # One more, for viewers that would sort what comes at the same time.
+        moment = self._logged[stamp] + round(1e9 * self._rate * seconds) + 1
+        self._writer.write(self._answers[heard.output], moment, heard.data)
 
 
 def _type_name(message_type: type) -> str:

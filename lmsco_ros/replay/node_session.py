@@ -145,6 +145,11 @@ class NodeSession:
         """Stop the node."""
         self.close()
 
+    @property
+    def outputs(self) -> tuple[str, ...]:
+        """Names from OUTPUTS that are listened to."""
+        return tuple(self._outputs)
+
     def publish_image(self, message: Image | CompressedImage | bytes) -> None:
         """Send an image to the node, as a message or as its serialized bytes."""
         self._images.publish(message)

@@ -25,6 +25,7 @@ from std_msgs.msg import Header
 
 from lmsco_ros.core.types import BoundingBox
 from lmsco_ros.replay.answers import Answer, Answers
+from lmsco_ros.replay.bag_images import serialized_stamp
 from lmsco_ros.replay.errors import NodeError
 from lmsco_ros.replay.node_session import Heard, NodeSession
 
@@ -53,6 +54,10 @@ class Exchange:
     latency: float | None
 
 
+def _ignore(heard: Heard, stamp: int, seconds: float) -> None:
+    """Do nothing with what was heard."""
+
+
 class Player:
     """
     Feeds a session and keeps account of the answers.
@@ -62,12 +67,13 @@ class Player:
     session : NodeSession
         The running node.
     on_heard : callable
-        Called with every message of the node.
+        Called with every message of the node about a frame that was sent, the stamp of the
+        frame in nanoseconds, and the seconds since it was sent.
 
     """
 
     def __init__(self, session: NodeSession,
-                 on_heard: Callable[[Heard], None] = lambda heard: None) -> None:
+                 on_heard: Callable[[Heard, int, float], None] = _ignore) -> None:
         self._session = session
         self._on_heard = on_heard
         self._answers = Answers()
@@ -85,10 +91,6 @@ class Player:
         self._sent[stamp] = time.monotonic()
         self._pending.append(stamp)
         self._session.publish_image(message)
-
-    def sent_at(self, stamp: int) -> float | None:
-        """Return when a frame was sent, on the clock of `time.monotonic`; None if never."""
-        return self._sent.get(stamp)
 
     def listen_until(self, moment: float) -> None:
         """
@@ -138,7 +140,9 @@ class Player:
 
     def _take(self, heard: Heard) -> None:
         answer = self._answers.take(heard)
-        self._on_heard(heard)
+        stamp = serialized_stamp(heard.data)
+        if stamp in self._sent:
+            self._on_heard(heard, stamp, heard.received - self._sent[stamp])
         if answer.failure:
             raise NodeError(f'the node refuses: {answer.failure}')
         if answer.is_tracked:

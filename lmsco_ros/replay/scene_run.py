@@ -27,7 +27,6 @@ from sensor_msgs.msg import Image
 from std_msgs.msg import Header
 
 from lmsco_ros.core.types import BoundingBox, TrackResult, TrackState
-from lmsco_ros.replay.bag_images import serialized_stamp
 from lmsco_ros.replay.node_session import Heard, NodeSession
 from lmsco_ros.replay.player import Exchange, Player
 from lmsco_ros.synthetic import SceneFrame
@@ -86,9 +85,9 @@ def run_scene(frames: Sequence[SceneFrame], parameters: Mapping[str, object],
     """
     maps: dict[int, _ConfidenceMap] = {}
 
-    def keep_map(heard: Heard) -> None:
+    def keep_map(heard: Heard, stamp: int, seconds: float) -> None:
         if heard.output == 'confidence_map':
-            maps[serialized_stamp(heard.data)] = _read_map(heard.data)
+            maps[stamp] = _read_map(heard.data)
 
     with NodeSession(parameters, outputs=('confidence_map',)) as session:
         player = Player(session, keep_map)

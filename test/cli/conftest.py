@@ -1,0 +1,62 @@
+# Copyright 2026 lmsco_ros contributors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The command line as a user meets it, and a scene to use it on."""
+
+import cv2
+import pytest
+from typer.testing import CliRunner
+
+from lmsco_ros.cli.main import build_app
+from lmsco_ros.synthetic import render_scene, SceneConfig
+
+SCENE = SceneConfig(width=160, height=128, frames=15, target_height=0.3)
+
+
+@pytest.fixture
+def lmsco():
+    """Return a function that runs `lmsco` with the given arguments."""
+    def run(*arguments):
+        return CliRunner().invoke(build_app(), [str(a) for a in arguments])
+    return run
+
+
+@pytest.fixture(scope='session')
+def scene():
+    """Return the frames of a small scene."""
+    return list(render_scene(SCENE))
+
+
+@pytest.fixture(scope='session')
+def scene_folder(tmp_path_factory, scene):
+    """Return the scene as a folder of 16-bit images."""
+    folder = tmp_path_factory.mktemp('scene') / 'ir'
+    folder.mkdir()
+    for frame in scene:
+        cv2.imwrite(str(folder / f'{frame.index:08d}.png'), frame.image)
+    return folder
+
+
+@pytest.fixture(scope='session')
+def start(scene):
+    """Return the target of the first frame as the option --init takes it."""
+    return ','.join(f'{value:.2f}' for value in scene[0].box.as_tuple())
+
+
+@pytest.fixture(scope='session')
+def truth(scene_folder, scene):
+    """Return the file with the true boxes."""
+    path = scene_folder.parent / 'groundtruth.txt'
+    path.write_text('\n'.join(','.join(map(str, f.box.as_tuple())) for f in scene))
+    return path

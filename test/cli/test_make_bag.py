@@ -1,0 +1,63 @@
+# Copyright 2026 lmsco_ros contributors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""`lmsco make-bag`: options reach the bag."""
+
+import cv2
+import numpy as np
+from rosbags.highlevel import AnyReader
+
+
+def connections_of(path):
+    with AnyReader([path]) as reader:
+        messages = [(t, reader.deserialize(d, c.msgtype)) for c, t, d in reader.messages()]
+        return list(reader.connections), messages
+
+
+def test_options_reach_the_bag(lmsco, tmp_path, scene_folder):
+    outcome = lmsco('make-bag', scene_folder, '--output', tmp_path / 'bag', '--storage',
+                    'sqlite3', '--fps', 10, '--topic', '/a/image', '--frame-id', 'here',
+                    '--frames', 4)
+    assert outcome.exit_code == 0 and '4 frames on /a/image' in outcome.output
+    (connection,), messages = connections_of(tmp_path / 'bag')
+    assert connection.topic == '/a/image'
+    assert np.diff([t for t, _ in messages]).tolist() == [100_000_000] * 3
+    assert messages[0][1].header.frame_id == 'here'
+    assert next((tmp_path / 'bag').glob('*.db3'))
+
+
+def test_gray_video_becomes_mono8(lmsco, tmp_path):
+    writer = cv2.VideoWriter(str(tmp_path / 'film.avi'), cv2.VideoWriter.fourcc(*'MJPG'), 20,
+                             (64, 48))
+    for index in range(5):
+        writer.write(np.full((48, 64, 3), 50 * index, np.uint8))
+    writer.release()
+    outcome = lmsco('make-bag', tmp_path / 'film.avi', '--output', tmp_path / 'bag')
+    assert outcome.exit_code == 0, outcome.output
+    _, messages = connections_of(tmp_path / 'bag')
+    assert [m.encoding for _, m in messages] == ['mono8'] * 5
+    assert np.diff([t for t, _ in messages]).tolist() == [50_000_000] * 4
+    assert next((tmp_path / 'bag').glob('*.mcap'))
+
+
+def test_a_bag_is_no_source(lmsco, tmp_path, scene_folder):
+    assert lmsco('make-bag', scene_folder, '--output', tmp_path / 'bag').exit_code == 0
+    outcome = lmsco('make-bag', tmp_path / 'bag', '--output', tmp_path / 'other')
+    assert outcome.exit_code == 2 and 'is a bag already' in outcome.output
+
+
+def test_existing_output_is_refused(lmsco, tmp_path, scene_folder):
+    (tmp_path / 'bag').mkdir()
+    outcome = lmsco('make-bag', scene_folder, '--output', tmp_path / 'bag')
+    assert outcome.exit_code == 1 and 'exists' in outcome.output

@@ -1,0 +1,125 @@
+# Copyright 2026 lmsco_ros contributors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""`lmsco track`: what it writes, and what it says when it cannot."""
+
+import csv
+import os
+import re
+import subprocess
+import sys
+
+import cv2
+import numpy as np
+import pytest
+
+from lmsco_ros.core.types import BoundingBox
+
+
+def rows_of(folder):
+    with (folder / 'boxes.csv').open() as stream:
+        return list(csv.DictReader(stream))
+
+
+def box_of(row):
+    return BoundingBox(*(float(row[key]) for key in ('x', 'y', 'width', 'height')))
+
+
+def test_follows_the_target_of_a_folder(lmsco, tmp_path, scene_folder, scene, start):
+    outcome = lmsco('track', scene_folder, '--init', start, '--output', tmp_path / 'run')
+    assert outcome.exit_code == 0, outcome.output
+    rows = rows_of(tmp_path / 'run')
+    assert [int(row['frame']) for row in rows] == list(range(15))
+    overlaps = [box_of(row).overlap(f.box) for row, f in zip(rows, scene)]
+    assert np.mean(overlaps) > 0.5 and overlaps[0] > 0.99
+    film = cv2.VideoCapture(str(tmp_path / 'run' / 'overlay.mp4'))
+    assert film.get(cv2.CAP_PROP_FRAME_COUNT) == 15
+    assert cv2.imread(str(tmp_path / 'run' / 'summary.png')) is not None
+
+
+def test_ground_truth_starts_and_judges(lmsco, tmp_path, scene_folder, truth):
+    outcome = lmsco('track', scene_folder, '--ground-truth', truth, '--frames', 6,
+                    '--output', tmp_path / 'run')
+    assert outcome.exit_code == 0, outcome.output
+    overlap = re.search(r'mean overlap (0\.\d+) over 6 frames', outcome.output)
+    assert overlap and float(overlap[1]) > 0.5
+    assert len(rows_of(tmp_path / 'run')) == 6
+
+
+def test_default_output_is_named_after_the_source(lmsco, tmp_path, scene_folder, start,
+                                                  monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert lmsco('track', scene_folder, '--init', start, '--frames', 2).exit_code == 0
+    assert (tmp_path / 'output' / 'ir' / 'boxes.csv').exists()
+
+
+def test_configuration_file(lmsco, tmp_path, scene_folder, start):
+    from lmsco_ros.core import TrackerConfig
+
+    TrackerConfig.preset('hcs').to_yaml(tmp_path / 'mine.yaml')
+    outcome = lmsco('track', scene_folder, '--init', start, '--frames', 2,
+                    '--config', tmp_path / 'mine.yaml', '--output', tmp_path / 'run')
+    assert outcome.exit_code == 0, outcome.output
+
+
+@pytest.mark.parametrize('arguments, code, words', [
+    (('--init', '1,2,3'), 2, 'four numbers'),
+    (('--init', '1,2,nan,4'), 2, 'four numbers'),
+    (('--init', '1,2,0,4'), 2, 'must be positive'),
+    ((), 2, 'no target; give --init'),
+    (('--init', '10,10,20,20', '--preset', 'nope'), 2, 'nope'),
+    (('--init', '10,10,20,20', '--config', 'missing.yaml'), 2, 'does not exist'),
+    (('--init', '10,10,20,20', '--topic', 'image'), 1, 'is not a bag'),
+    (('--init', '900,10,20,20'), 1, '900'),
+])
+def test_errors_are_one_clear_line(lmsco, tmp_path, scene_folder, arguments, code, words):
+    outcome = lmsco('track', scene_folder, '--output', tmp_path / 'run', *arguments)
+    assert outcome.exit_code == code, outcome.output
+    assert words in ' '.join(outcome.output.replace('│', ' ').split())
+    assert 'Traceback' not in outcome.output
+
+
+def test_missing_source(lmsco, tmp_path):
+    outcome = lmsco('track', tmp_path / 'nothing', '--init', '1,2,3,4')
+    assert outcome.exit_code == 2 and 'does not exist' in outcome.output
+
+
+def test_empty_folder(lmsco, tmp_path):
+    outcome = lmsco('track', tmp_path, '--init', '1,2,3,4')
+    assert outcome.exit_code == 1 and 'has no images' in outcome.output
+
+
+def test_broken_video(lmsco, tmp_path):
+    (tmp_path / 'film.mp4').write_bytes(b'no film')
+    outcome = lmsco('track', tmp_path / 'film.mp4', '--init', '1,2,3,4')
+    assert outcome.exit_code == 1 and 'not a readable video' in outcome.output
+
+
+@pytest.mark.parametrize('kind, blocked', [
+    ('folder', 'rclpy,sensor_msgs,std_msgs,geometry_msgs'), ('bag', 'rclpy')])
+def test_recordings_are_tracked_without_ros(lmsco, tmp_path, scene_folder, start, kind, blocked):
+    source = scene_folder
+    if kind == 'bag':
+        source = tmp_path / 'bag'
+        assert lmsco('make-bag', scene_folder, '--output', source).exit_code == 0
+    code = ('import sys\n'
+            f'sys.modules.update(dict.fromkeys({blocked!r}.split(",")))\n'
+            'from lmsco_ros.cli.main import main\n'
+            'main()\n')
+    ended = subprocess.run(
+        [sys.executable, '-c', code, 'track', str(source), '--init', start, '--frames', '3',
+         '--output', str(tmp_path / 'run')],
+        env=dict(os.environ), capture_output=True, text=True, timeout=100)
+    assert ended.returncode == 0, ended.stderr
+    assert len(rows_of(tmp_path / 'run')) == 3

@@ -1,0 +1,150 @@
+# Copyright 2026 lmsco_ros contributors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The real node with a tracker that does as told: pace, order, refusals."""
+
+from functools import partial
+import threading
+import time
+
+import numpy as np
+import pytest
+from std_msgs.msg import Header
+
+from lmsco_ros.core.errors import BoxError
+from lmsco_ros.core.types import BoundingBox, TrackResult, TrackState
+from lmsco_ros.node.tracker_node import TrackerNode
+from lmsco_ros.replay.errors import NodeError
+from lmsco_ros.replay.node_session import NodeSession
+from lmsco_ros.replay.player import Player
+from msg_adapters.image import message_from_image
+
+START = BoundingBox(5, 6, 10, 12)
+SECOND = 1_000_000_000
+
+
+class Follower:
+    """Says the brightness of the image's first pixel as x; counts what it saw."""
+
+    def __init__(self, gate=None):
+        self.seen = []
+        self.gate = gate
+
+    def initialize(self, image, box):
+        if box.x > 60:
+            raise BoxError('the box is outside of the image')
+        return self._result(image, box)
+
+    def update(self, image):
+        if self.gate is not None:
+            self.gate.wait(10)
+        state = TrackState.LOST if image[0, 0] == 255 else TrackState.TRACKING
+        return self._result(image, BoundingBox(float(image[0, 0]), 6, 10, 12), state)
+
+    def _result(self, image, box, state=TrackState.TRACKING):
+        self.seen.append(int(image[0, 0]))
+        return TrackResult(box, 0.5, state, np.ones((4, 4), np.float32), box)
+
+
+def session(tracker, policy='all', outputs=()):
+    make_node = partial(TrackerNode, tracker_factory=lambda settings: tracker)
+    return NodeSession({'frame_policy': policy, 'image_reliability': 'reliable',
+                        'image_depth': 0},
+                       outputs=outputs, make_node=make_node)
+
+
+def image_message(value, stamp):
+    header = Header()
+    header.stamp.sec, header.stamp.nanosec = divmod(stamp, SECOND)
+    return message_from_image(np.full((48, 64), value, np.uint8), header=header)
+
+
+def play(player, values, in_flight=1):
+    for index, value in enumerate(values):
+        stamp = (index + 1) * SECOND
+        if not index:
+            player.start(START, stamp)
+        player.send(stamp, image_message(value, stamp))
+        player.settle(0 if not index else in_flight)
+    player.settle(0)
+
+
+def test_every_frame_is_answered_in_order():
+    tracker = Follower()
+    with session(tracker) as running:
+        player = Player(running)
+        play(player, range(40))
+    exchanges = player.exchanges()
+    assert tracker.seen == list(range(40))
+    assert [e.stamp for e in exchanges] == [(i + 1) * SECOND for i in range(40)]
+    assert exchanges[0].answer.box == START
+    assert [e.answer.box.x for e in exchanges[1:]] == list(range(1, 40))
+    assert all(e.latency > 0 and e.answer.status.state == 'tracking' for e in exchanges)
+
+
+def test_lost_frames_are_answered_without_a_box():
+    with session(Follower()) as running:
+        player = Player(running)
+        play(player, [1, 2, 255, 4])
+    states = [(e.answer.status.state, e.answer.box is None) for e in player.exchanges()]
+    assert states == [('tracking', False), ('tracking', False), ('lost', True),
+                      ('tracking', False)]
+
+
+def test_other_outputs_are_heard():
+    heard = []
+    with session(Follower(), outputs=('confidence_map', 'overlay', 'marker')) as running:
+        player = Player(running, lambda message, stamp, seconds: heard.append(message))
+        play(player, range(5))
+        while {'confidence_map', 'overlay', 'marker'} - {h.output for h in heard}:
+            message = running.next_message(10)
+            assert message is not None
+            heard.append(message)
+
+
+def test_dropped_frames_have_no_latency():
+    gate = threading.Event()
+    with session(Follower(gate), policy='latest') as running:
+        player = Player(running)
+        play(player, [0])
+        for index in range(1, 12):
+            player.send((index + 1) * SECOND, image_message(index, (index + 1) * SECOND))
+        player.listen_until(time.monotonic() + 0.2)
+        gate.set()
+        player.finish()
+    exchanges = player.exchanges()
+    answered = [e.latency is not None for e in exchanges]
+    assert answered[0] and answered[-1]
+    assert answered.count(False) == exchanges[-1].answer.status.dropped_frames
+
+
+def test_refused_start_is_told():
+    with session(Follower()) as running:
+        player = Player(running)
+        player.start(BoundingBox(61, 1, 5, 5), SECOND)
+        player.send(SECOND, image_message(1, SECOND))
+        with pytest.raises(NodeError, match='outside of the image'):
+            player.settle(0)
+
+
+def test_node_that_does_not_start_is_told():
+    with pytest.raises(NodeError, match='did not start'):
+        NodeSession({'preset': 'no such preset'})
+
+
+def test_sessions_follow_each_other():
+    for _ in range(2):
+        with session(Follower()) as running:
+            play(Player(running), [1, 2])
+    assert not [t for t in threading.enumerate() if t.name == 'lmsco_tracker']
