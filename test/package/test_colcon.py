@@ -14,6 +14,7 @@
 
 """`colcon build` and `colcon test` work, and what they install starts as a node."""
 
+import os
 from pathlib import Path
 import signal
 import subprocess
@@ -51,14 +52,14 @@ def sourced(workspace, command):
     return ['bash', '-c', f'source {workspace}/install/setup.bash && exec {command}']
 
 
-def wait_for_node(name, process):
+def wait_for_node(name, namespace, process):
     """Wait until a node is seen on the graph, from a context and node of our own."""
     context = rclpy.Context()
     rclpy.init(context=context)
     try:
         observer = rclpy.create_node('observer', context=context)
         deadline = time.monotonic() + STARTUP_SECONDS
-        while name not in observer.get_node_names():
+        while (name, namespace) not in observer.get_node_names_and_namespaces():
             assert process.poll() is None, process.communicate()[0]
             assert time.monotonic() < deadline, f'{name} is not on the graph'
             time.sleep(0.05)
@@ -90,11 +91,13 @@ def test_installed_code_is_what_runs(workspace):
 def test_installed_node_starts_and_stops(workspace, stop):
     """`lib/lmsco_ros/tracker_node` appears on the graph and leaves it without a traceback."""
     executable = workspace / 'install/lmsco_ros/lib/lmsco_ros/tracker_node'
+    # The graph may still remember a node of another test by its usual name.
+    namespace = f'/{stop.name.lower()}_{os.getpid()}'
     with subprocess.Popen(
-            sourced(workspace, str(executable)), cwd=workspace, text=True,
-            stdout=subprocess.PIPE, stderr=subprocess.STDOUT) as process:
+            sourced(workspace, f'{executable} --ros-args -r __ns:={namespace}'), cwd=workspace,
+            text=True, stdout=subprocess.PIPE, stderr=subprocess.STDOUT) as process:
         try:
-            wait_for_node('lmsco_tracker', process)
+            wait_for_node('lmsco_tracker', namespace, process)
             process.send_signal(stop)
             output, _ = process.communicate(timeout=EXIT_SECONDS)
         finally:
