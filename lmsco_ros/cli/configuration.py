@@ -36,3 +36,8 @@ def load_config(preset: str, path: Optional[Path] = None) -> TrackerConfig:
     from lmsco_ros.core import TrackerConfig
 
     return TrackerConfig.from_yaml(path) if path else TrackerConfig.preset(preset)
+
+
+def node_parameters(preset: str, path: Optional[Path] = None) -> dict[str, str]:
+    """Return the parameters that tell the node to use the configuration of `load_config`."""
+    return {'preset': preset, 'tracker_config': str(path.resolve()) if path else ''}

@@ -18,6 +18,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from typing import NoReturn
 
 from rich.console import Console
 from rich.markup import escape
@@ -48,7 +49,7 @@ def plain_errors() -> Iterator[None]:
         fail(str(error), FAILED)
 
 
-def fail(message: str, code: int) -> None:
+def fail(message: str, code: int) -> NoReturn:
     """Say what went wrong and leave."""
     Console(stderr=True, soft_wrap=True).print(
         f'[bold red]error:[/] {escape(message)}', highlight=False)

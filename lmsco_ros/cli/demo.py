@@ -27,9 +27,9 @@ from rich.progress import Progress
 from rich.table import Table
 import typer
 
-from lmsco_ros.cli.configuration import load_config
+from lmsco_ros.cli.configuration import load_config, node_parameters
 from lmsco_ros.cli.console import fail, FAILED, frame_progress, plain_errors, say
-from lmsco_ros.cli.options import PresetOption
+from lmsco_ros.cli.options import ConfigOption, PresetOption
 from lmsco_ros.cli.ros import require_ros
 
 if TYPE_CHECKING:
@@ -47,6 +47,7 @@ def demo(
         file_okay=False, help='Folder for boxes.csv, overlay.mp4 and summary.png.')] = Path(
             'output/demo'),
     preset: PresetOption = 'default',
+    config: ConfigOption = None,
     frames: Annotated[int, typer.Option(min=2, help='Length of the scene.')] = 360,
     width: Annotated[int, typer.Option(min=32, help='Width of the images.')] = 640,
     height: Annotated[int, typer.Option(min=32, help='Height of the images.')] = 512,
@@ -58,40 +59,41 @@ def demo(
     """Render a thermal scene, track in it with the node, and compare with the truth."""
     with plain_errors():
         require_ros()
-        load_config(preset)
+        load_config(preset, config)
         from lmsco_ros.replay.scene_run import run_scene
         from lmsco_ros.synthetic import SceneConfig
 
-        config = SceneConfig(width=width, height=height, frames=frames, fps=rate, seed=seed)
+        plot = SceneConfig(width=width, height=height, frames=frames, fps=rate, seed=seed)
         with frame_progress() as progress:
-            scene = _render(config, progress)
+            scene = _render(plot, progress)
             task = progress.add_task('tracking', total=frames)
-            tracked = run_scene(scene, {'preset': preset}, lambda: progress.advance(task))
+            tracked = run_scene(scene, node_parameters(preset, config),
+                                lambda: progress.advance(task))
             if not tracked:
                 fail('the node answered no frame', FAILED)
             task = progress.add_task('writing', total=len(tracked))
-            for _ in _write(tracked, config, preset, output):
+            for _ in _write(tracked, plot, config.stem if config else preset, output):
                 progress.advance(task)
         _tell(tracked, frames)
         say(f'boxes.csv, overlay.mp4 and summary.png are in {output}')
 
 
-def _render(config: SceneConfig, progress: Progress) -> list[SceneFrame]:
+def _render(plot: SceneConfig, progress: Progress) -> list[SceneFrame]:
     """Render everything first, so that the figures are those of the node alone."""
     from lmsco_ros.synthetic import render_scene
 
-    return list(progress.track(render_scene(config), total=config.frames,
+    return list(progress.track(render_scene(plot), total=plot.frames,
                                description='rendering'))
 
 
-def _write(tracked: Sequence[TrackedFrame], config: SceneConfig, preset: str,
+def _write(tracked: Sequence[TrackedFrame], plot: SceneConfig, tracker: str,
            folder: Path) -> Iterator[None]:
     """Write the outputs, frame by frame."""
     from lmsco_ros.replay.frame import Frame
     from lmsco_ros.replay.run_outputs import RunOutputs
 
-    title = f'rendered scene {config.seed}  ·  {preset}'
-    with RunOutputs(folder, config.fps, title) as outputs:
+    title = f'rendered scene {plot.seed}  ·  {tracker}'
+    with RunOutputs(folder, plot.fps, title) as outputs:
         for item in tracked:
             frame = item.frame
             outputs.add(Frame(frame.index, frame.stamp_ns, frame.image), item.result, frame.box)

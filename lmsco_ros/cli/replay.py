@@ -17,11 +17,11 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Optional
+from typing import Annotated
 
 import typer
 
-from lmsco_ros.cli.configuration import load_config
+from lmsco_ros.cli.configuration import load_config, node_parameters
 from lmsco_ros.cli.console import frame_progress, plain_errors, say, warn
 from lmsco_ros.cli.options import (
     BagArgument, ConfigOption, FramesOption, InitOption, PresetOption, TopicOption)
@@ -63,20 +63,15 @@ def replay(
         plan = ReplayPlan(
             bag=bag, output=output, storage=storage, box=BoundingBox(*init), topic=topic,
             rate=rate, frames=frames, outputs=extra,
-            parameters={'preset': preset, 'tracker_config': _absolute(config)})
+            parameters=node_parameters(preset, config))
         with frame_progress() as progress:
             task = progress.add_task('replaying')
             exchanges = replay_bag(
                 plan, lambda total: progress.update(task, total=total),
                 lambda: progress.advance(task))
-    latencies = [e.latency * 1e3 for e in exchanges if e.latency is not None]
-    dropped = len(exchanges) - len(latencies)
+    dropped = sum(exchange.latency is None for exchange in exchanges)
     if dropped:
         warn(f'the node dropped {dropped} of {len(exchanges)} frames because it was not done '
              'with earlier ones; use --rate 0 to track every frame')
-    say(f'{len(latencies)} of {len(exchanges)} frames answered')
+    say(f'{len(exchanges) - dropped} of {len(exchanges)} frames answered')
     say(f'original messages and answers are in {output}')
-
-
-def _absolute(path: Optional[Path]) -> str:
-    return str(path.resolve()) if path else ''

@@ -75,15 +75,31 @@ def draw_overlay(image: npt.NDArray, result: TrackResult | None, *,
 
 
 def draw_box(canvas: npt.NDArray[np.uint8], box: BoundingBox, color: Color, *,
-             dashed: bool = False) -> None:
-    """Draw the outline of `box` into `canvas` (H, W, 3), to a fraction of a pixel."""
+             dashed: bool = False, thickness: int = 0) -> None:
+    """
+    Draw the outline of `box` to a fraction of a pixel.
+
+    Parameters
+    ----------
+    canvas : ndarray, shape (H, W, 3), uint8
+        Drawn into.
+    box : BoundingBox
+        May lie outside of the canvas.
+    color : (int, int, int)
+        Blue, green, red.
+    dashed : bool
+        Draw dashes instead of lines.
+    thickness : int
+        In pixels; 0 chooses it in proportion to the canvas.
+
+    """
     height, width = canvas.shape[:2]
     # OpenCV puts the center of the first pixel at 0, boxes put its corner there. Edges
     # that are out of sight stay so, but come near enough for fixed-point coordinates.
     left, right = np.clip([box.x, box.x + box.width], -_MARGIN, width + _MARGIN) - 0.5
     top, bottom = np.clip([box.y, box.y + box.height], -_MARGIN, height + _MARGIN) - 0.5
     corners = [(left, top), (right, top), (right, bottom), (left, bottom)]
-    thickness = max(1, round(min(height, width) / 300))
+    thickness = thickness or max(1, round(min(height, width) / 300))
     edges = list(zip(corners, corners[1:] + corners[:1]))
     if dashed:
         edges = [dash for edge in edges for dash in _dashes(*edge, 4.0 * thickness + 2)]

@@ -29,7 +29,7 @@ from lmsco_ros.visualization.display_range import DisplayRange
 from lmsco_ros.visualization.overlay import draw_box, draw_overlay
 
 # Below this height text hides much of the scene; small sensors are shown enlarged.
-_COMFORTABLE_HEIGHT = 360
+_COMFORTABLE_HEIGHT = 480
 _TRUTH_COLOR = (235, 235, 235)
 
 
@@ -91,7 +91,7 @@ class OverlayVideo:
             if factor > 1 else view
         if truth is not None:
             large = cv2.cvtColor(large, cv2.COLOR_GRAY2BGR) if large.ndim == 2 else large.copy()
-            draw_box(large, scaled(truth, factor), _TRUTH_COLOR, dashed=True)
+            draw_box(large, scaled(truth, factor), _TRUTH_COLOR, thickness=1)
         canvas = draw_overlay(large, replace(result, box=scaled(result.box, factor)),
                               label=label)
         self._write(canvas)
@@ -118,7 +118,7 @@ class OverlayVideo:
 
 def enlargement(height: int) -> int:
     """Return the whole factor that shows an image of `height` pixels comfortably."""
-    return max(1, -(-_COMFORTABLE_HEIGHT // height)) if height < 0.75 * _COMFORTABLE_HEIGHT else 1
+    return max(1, -(-_COMFORTABLE_HEIGHT // height)) if height < 0.7 * _COMFORTABLE_HEIGHT else 1
 
 
 def scaled(box: BoundingBox, factor: float) -> BoundingBox:

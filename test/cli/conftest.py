@@ -14,6 +14,8 @@
 
 """The command line as a user meets it, and a scene to use it on."""
 
+from dataclasses import dataclass
+
 import cv2
 import pytest
 from typer.testing import CliRunner
@@ -24,11 +26,22 @@ from lmsco_ros.synthetic import render_scene, SceneConfig
 SCENE = SceneConfig(width=160, height=128, frames=15, target_height=0.3)
 
 
+@dataclass(frozen=True)
+class Outcome:
+    """Exit code of a command, what it said, and the same without frames and line ends."""
+
+    exit_code: int
+    output: str
+    words: str
+
+
 @pytest.fixture
 def lmsco():
     """Return a function that runs `lmsco` with the given arguments."""
     def run(*arguments):
-        return CliRunner().invoke(build_app(), [str(a) for a in arguments])
+        result = CliRunner().invoke(build_app(), [str(a) for a in arguments])
+        words = ' '.join(result.output.replace('│', ' ').split())
+        return Outcome(result.exit_code, result.output, words)
     return run
 
 

@@ -29,7 +29,7 @@ def test_demo_tracks_writes_and_measures(lmsco, tmp_path):
     overlap = re.search(r'mean overlap +(\d\.\d+)', outcome.output)
     assert overlap and 0 < float(overlap[1]) <= 1
     for words in ('precision at 5 px / 20 px', 'latency, image to box', 'p95'):
-        assert words in outcome.output
+        assert words in outcome.words
     with (tmp_path / 'demo' / 'boxes.csv').open() as stream:
         assert len(list(csv.DictReader(stream))) == int(answered[1])
     assert cv2.imread(str(tmp_path / 'demo' / 'summary.png')) is not None
@@ -39,4 +39,4 @@ def test_demo_tracks_writes_and_measures(lmsco, tmp_path):
 
 def test_unknown_preset(lmsco, tmp_path):
     outcome = lmsco('demo', '--preset', 'nope', '--output', tmp_path)
-    assert outcome.exit_code == 2 and 'nope' in outcome.output
+    assert outcome.exit_code == 2 and 'nope' in outcome.words

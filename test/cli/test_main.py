@@ -27,7 +27,7 @@ from lmsco_ros.replay.node_session import OUTPUTS
 @pytest.mark.parametrize('command', ['track', 'replay', 'make-bag', 'demo', 'evaluate'])
 def test_every_command_has_help(lmsco, command):
     outcome = lmsco(command, '--help')
-    assert outcome.exit_code == 0 and '--output' in outcome.output
+    assert outcome.exit_code == 0 and '--output' in outcome.words
 
 
 def test_without_arguments_it_explains_itself(lmsco):

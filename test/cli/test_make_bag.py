@@ -29,7 +29,7 @@ def test_options_reach_the_bag(lmsco, tmp_path, scene_folder):
     outcome = lmsco('make-bag', scene_folder, '--output', tmp_path / 'bag', '--storage',
                     'sqlite3', '--fps', 10, '--topic', '/a/image', '--frame-id', 'here',
                     '--frames', 4)
-    assert outcome.exit_code == 0 and '4 frames on /a/image' in outcome.output
+    assert outcome.exit_code == 0 and '4 frames on /a/image' in outcome.words
     (connection,), messages = connections_of(tmp_path / 'bag')
     assert connection.topic == '/a/image'
     assert np.diff([t for t, _ in messages]).tolist() == [100_000_000] * 3
@@ -54,10 +54,10 @@ def test_gray_video_becomes_mono8(lmsco, tmp_path):
 def test_a_bag_is_no_source(lmsco, tmp_path, scene_folder):
     assert lmsco('make-bag', scene_folder, '--output', tmp_path / 'bag').exit_code == 0
     outcome = lmsco('make-bag', tmp_path / 'bag', '--output', tmp_path / 'other')
-    assert outcome.exit_code == 2 and 'is a bag already' in outcome.output
+    assert outcome.exit_code == 2 and 'is a bag already' in outcome.words
 
 
 def test_existing_output_is_refused(lmsco, tmp_path, scene_folder):
     (tmp_path / 'bag').mkdir()
     outcome = lmsco('make-bag', scene_folder, '--output', tmp_path / 'bag')
-    assert outcome.exit_code == 1 and 'exists' in outcome.output
+    assert outcome.exit_code == 1 and 'exists' in outcome.words

@@ -86,24 +86,24 @@ def test_configuration_file(lmsco, tmp_path, scene_folder, start):
 def test_errors_are_one_clear_line(lmsco, tmp_path, scene_folder, arguments, code, words):
     outcome = lmsco('track', scene_folder, '--output', tmp_path / 'run', *arguments)
     assert outcome.exit_code == code, outcome.output
-    assert words in ' '.join(outcome.output.replace('│', ' ').split())
+    assert words in outcome.words
     assert 'Traceback' not in outcome.output
 
 
 def test_missing_source(lmsco, tmp_path):
     outcome = lmsco('track', tmp_path / 'nothing', '--init', '1,2,3,4')
-    assert outcome.exit_code == 2 and 'does not exist' in outcome.output
+    assert outcome.exit_code == 2 and 'does not exist' in outcome.words
 
 
 def test_empty_folder(lmsco, tmp_path):
     outcome = lmsco('track', tmp_path, '--init', '1,2,3,4')
-    assert outcome.exit_code == 1 and 'has no images' in outcome.output
+    assert outcome.exit_code == 1 and 'has no images' in outcome.words
 
 
 def test_broken_video(lmsco, tmp_path):
     (tmp_path / 'film.mp4').write_bytes(b'no film')
     outcome = lmsco('track', tmp_path / 'film.mp4', '--init', '1,2,3,4')
-    assert outcome.exit_code == 1 and 'not a readable video' in outcome.output
+    assert outcome.exit_code == 1 and 'not a readable video' in outcome.words
 
 
 @pytest.mark.parametrize('kind, blocked', [

@@ -60,8 +60,9 @@ def test_box_moves_in_the_film(tmp_path):
 
 
 def test_small_images_are_enlarged_and_large_ones_are_not():
-    assert enlargement(120) == 3 and enlargement(60) == 6
-    assert enlargement(288) == enlargement(512) == enlargement(1080) == 1
+    assert enlargement(120) == 4 and enlargement(60) == 8
+    assert enlargement(256) == 2
+    assert enlargement(356) == enlargement(512) == enlargement(1080) == 1
 
 
 def test_a_size_that_changes_does_not_end_the_film(tmp_path):
