@@ -260,24 +260,20 @@ class TrackerWorker:
             The target.
         stamp : int, optional
             Stamp of the frame that the box was seen in, in nanoseconds. Frames that came
-            since are gone through again. By default the newest frame is taken. When there
-            is no such frame yet, the start waits for it, as long as frames are kept.
+            since are gone through again. By default the newest frame is taken. A start
+            whose frame is still to come waits for it: without a stamp for the first frame,
+            with one no longer than frames are kept.
 
         """
         with self._intake:
             self._supersede()
-            frames = list(self._history)
-            if stamp is None:
-                frames = frames[-1:]
-            elif frames and stamp <= frames[-1].stamp:
-                newest, frames = frames[-1], self._history.since(stamp)
-                if not frames:
-                    self._mailbox.put(_Refuse(newest, _unknown_stamp(stamp, self._history)))
-                    return
-            else:
-                frames = []
-            if not frames:
+            newest = self._history[-1] if self._history else None
+            if newest is None or stamp is not None and stamp > newest.stamp:
                 self._request = _Request(box, stamp, time.monotonic())
+                return
+            frames = [newest] if stamp is None else self._history.since(stamp)
+            if not frames:
+                self._mailbox.put(_Refuse(newest, _unknown_stamp(stamp, self._history)))
                 return
             self._mailbox.put(_Start(frames[0], box))
             for frame in frames[1:]:

@@ -37,7 +37,8 @@ from msg_adapters.boxes import box_from_polygon, polygon_from_box
 from msg_adapters.image import message_from_image
 from msg_adapters.status import status_from_message
 
-PATIENCE = 20.0
+# Longer than the 20 s after which the middleware forgets a participant that was killed.
+PATIENCE = 40.0
 
 
 class FakeTracker:
