@@ -14,14 +14,16 @@
 
 """The command line explains itself, quickly and also without ROS."""
 
+import math
 import subprocess
 import sys
 
+from hypothesis import given, strategies as st
 import pytest
-from typer import Exit
+from typer import BadParameter, Exit
 
+from lmsco_ros.cli.options import parse_box
 from lmsco_ros.cli.ros import require_ros
-from lmsco_ros.replay.node_session import OUTPUTS
 
 
 @pytest.mark.parametrize('command', ['track', 'replay', 'make-bag', 'demo', 'evaluate'])
@@ -59,5 +61,16 @@ def test_missing_ros_is_told_with_its_remedy(monkeypatch, capsys):
     assert 'needs ROS 2' in message and 'rclpy' in message and 'extra `ros`' in message
 
 
-def test_outputs_of_the_node_are_known():
-    assert {'box', 'status'} < set(OUTPUTS)
+@given(st.tuples(*[st.floats(-1e4, 1e4)] * 2, *[st.floats(1e-3, 1e4)] * 2))
+def test_any_box_can_be_written_as_an_option(box):
+    assert parse_box(','.join(map(repr, box))) == box
+
+
+@given(st.text(alphabet='0123456789,.-+einfa x', max_size=20))
+def test_other_texts_are_a_box_or_a_bad_parameter(text):
+    try:
+        x, y, width, height = parse_box(text)
+    except BadParameter as error:
+        assert 'box' in str(error) or 'positive' in str(error)
+    else:
+        assert width > 0 and height > 0 and math.isfinite(x + y)

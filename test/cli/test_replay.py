@@ -19,9 +19,12 @@ from collections import Counter
 import numpy as np
 import pytest
 from rosbags.highlevel import AnyReader
+from rosbags.rosbag2 import StoragePlugin, Writer
+from rosbags.typesys import get_typestore, Stores
 
 from lmsco_ros.core.types import BoundingBox
-from lmsco_ros.replay.bag_images import header_stamp
+from lmsco_ros.replay.bag_images import header_stamp, RAW
+from lmsco_ros.replay.bag_maker import image_message
 
 
 def read(path):
@@ -75,6 +78,24 @@ def test_node_and_library_agree(lmsco, tmp_path, bag, start):
     answers = [corners(m).as_tuple() for topic, _, m in read(tmp_path / 'out')
                if topic == '/lmsco_tracker/box']
     np.testing.assert_allclose(answers, expected, atol=0.01)
+
+
+def test_old_bags_without_type_definitions(lmsco, tmp_path, scene, start):
+    store = get_typestore(Stores.ROS2_JAZZY)
+    with Writer(tmp_path / 'old', version=8, storage_plugin=StoragePlugin.SQLITE3) as writer:
+        connection = writer.add_connection('/image_raw', RAW, typestore=store)
+        chat = writer.add_connection('/chat', 'std_msgs/msg/String', typestore=store)
+        for frame in scene[:3]:
+            message = image_message(store, frame.image, frame.stamp_ns + 1, 'camera')
+            writer.write(connection, frame.stamp_ns, store.serialize_cdr(message, RAW))
+        text = store.types['std_msgs/msg/String'](data='hello')
+        writer.write(chat, 1, store.serialize_cdr(text, 'std_msgs/msg/String'))
+    outcome = lmsco('replay', tmp_path / 'old', '--init', start, '--rate', 0,
+                    '--output', tmp_path / 'out')
+    assert outcome.exit_code == 0, outcome.output
+    messages = read(tmp_path / 'out')
+    assert [m.data for topic, _, m in messages if topic == '/chat'] == ['hello']
+    assert '/lmsco_tracker/box' in {topic for topic, _, _ in messages}
 
 
 def test_recorded_rate_and_pictures(lmsco, tmp_path, bag, start):
