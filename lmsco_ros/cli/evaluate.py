@@ -75,11 +75,14 @@ def evaluate(
     """Run trackers over a dataset and report accuracy, robustness and speed."""
     from lmsco_ros.evaluation.runner import Evaluation
     from lmsco_ros.evaluation.session import (
-        build_trackers, describe, Request, select_sequences)
+        build_trackers, buildable_trackers, describe, Request, select_sequences)
 
     with plain_errors():
         request = Request(dataset, sequences, frames, split.value if split else None)
-        trackers = build_trackers(tracker or ())
+        trackers, unavailable = (
+            (build_trackers(tracker), ()) if tracker else buildable_trackers())
+        for reason in unavailable:
+            warn(f'left out: {reason}')
         selection = select_sequences(request)
         evaluation = Evaluation(trackers, selection.sequences, protocol.value, output)
         _run(evaluation, jobs)

@@ -24,7 +24,7 @@ from typing import Any, Optional, Sequence
 
 from lmsco_ros.evaluation.datasets import BrokenSequence, scan_dataset, TrackingSequence
 from lmsco_ros.evaluation.environment import machine, versions
-from lmsco_ros.evaluation.errors import DatasetError
+from lmsco_ros.evaluation.errors import DatasetError, TrackerError
 from lmsco_ros.evaluation.split import load_split
 from lmsco_ros.evaluation.trackers import available_names, resolve, TrackerSpec
 
@@ -94,7 +94,7 @@ def build_trackers(names: Sequence[str]) -> tuple[TrackerSpec, ...]:
     Parameters
     ----------
     names : sequence of str
-        As on the command line; all that work here when empty.
+        As on the command line.
 
     Raises
     ------
@@ -102,10 +102,22 @@ def build_trackers(names: Sequence[str]) -> tuple[TrackerSpec, ...]:
         When one is unknown or cannot be built here.
 
     """
-    specs = tuple(resolve(name) for name in dict.fromkeys(names or available_names()))
+    specs = tuple(resolve(name) for name in dict.fromkeys(names))
     for spec in specs:
         spec.build().close()
     return specs
+
+
+def buildable_trackers() -> tuple[tuple[TrackerSpec, ...], tuple[str, ...]]:
+    """Return every tracker that works here, and why others do not."""
+    specs: list[TrackerSpec] = []
+    reasons: list[str] = []
+    for name in available_names():
+        try:
+            specs += build_trackers([name])
+        except TrackerError as error:
+            reasons.append(str(error))
+    return tuple(specs), tuple(reasons)
 
 
 def describe(request: Request, jobs: int, skipped: Sequence[BrokenSequence]) -> dict[str, Any]:

@@ -108,7 +108,7 @@ def parse(tmp_path, sequences):
     return write
 
 
-def test_page_holds_every_tracker_and_sequence_and_refers_to_nothing_outside(parse, runs):
+def test_page_holds_everything_and_refers_to_nothing_outside(parse, runs, tmp_path):
     page = parse(runs)
     text = ' '.join(page.text)
     for name in (*TRACKERS, 'birds', 'a<b>&c', 'camera motion', 'Abacus 3000', '2026-01-01'):
@@ -118,6 +118,9 @@ def test_page_holds_every_tracker_and_sequence_and_refers_to_nothing_outside(par
     assert all(reference.startswith(('data:image/', '#')) for reference in page.references)
     # Eight plots, two thumbnails, and the strips of the tracker that never moved.
     assert page.images == 8 + 2 + 2
+    names = {path.stem for path in (tmp_path / 'pictures').glob('*.png')}
+    assert {'success', 'precision', 'normalized_precision', 'speed', 'ar_raw', 'ar_rank',
+            'eao_curve', 'eao_order', 'failure_lazy_vot_tir_birds'} <= names
 
 
 @pytest.mark.parametrize('protocol', ['ope', 'vot'])
@@ -126,13 +129,6 @@ def test_page_of_one_protocol_alone(parse, runs, protocol):
     assert page.images == 4 + 2 + 2
     anchors = [item for item in page.references if item.startswith('#')]
     assert ('#one-pass' in anchors) == (protocol == 'ope')
-
-
-def test_plots_and_strips_are_files_beside_the_page(parse, runs, tmp_path):
-    parse(runs)
-    names = {path.stem for path in (tmp_path / 'pictures').glob('*.png')}
-    assert {'success', 'precision', 'normalized_precision', 'speed', 'ar_raw', 'ar_rank',
-            'eao_curve', 'eao_order', 'failure_lazy_vot_tir_birds'} <= names
 
 
 def test_only_the_tracker_that_fails_is_shown_failing(runs):

@@ -18,9 +18,10 @@ import cv2
 import numpy as np
 import pytest
 
-from lmsco_ros.core import BoundingBox, TrackerConfig
+from lmsco_ros.core import BoundingBox, ConfigError, TrackerConfig
 from lmsco_ros.evaluation.errors import TrackerError
-from lmsco_ros.evaluation.trackers import available_names, resolve
+from lmsco_ros.evaluation.session import build_trackers, buildable_trackers
+from lmsco_ros.evaluation.trackers import available_names, preset, resolve
 from lmsco_ros.evaluation.trackers.opencv_image import EightBitView
 from lmsco_ros.evaluation.trackers.opencv_peer import OPENCV_NAMES, OpenCVSpec, OpenCVTracker
 
@@ -89,6 +90,22 @@ def test_model_files_are_asked_for():
         resolve('vit:/nowhere/net.onnx')
 
 
+def test_model_files_reach_opencv(tmp_path, monkeypatch):
+    created = []
+    network = type('Network', (), {'create': staticmethod(created.append)})
+    monkeypatch.setattr(cv2, 'TrackerNano', network, raising=False)
+    monkeypatch.setattr(cv2, 'TrackerNano_Params', type('Parameters', (), {}), raising=False)
+    for name in ('a.onnx', 'b.onnx'):
+        (tmp_path / name).write_bytes(name.encode())
+    spec = resolve(f'nanotrack:{tmp_path}/a.onnx,{tmp_path}/b.onnx')
+    with pytest.raises(AttributeError):
+        spec.build().initialize(scene(0), START)
+    assert vars(created[0]) == {'backbone': f'{tmp_path}/a.onnx', 'neckhead': f'{tmp_path}/b.onnx'}
+    identity = spec.identity
+    (tmp_path / 'b.onnx').write_bytes(b'other weights')
+    assert spec.identity != identity
+
+
 def test_every_preset_is_found_by_name():
     for name in TrackerConfig.preset_names():
         assert resolve(name).name == name
@@ -99,6 +116,17 @@ def test_identity_follows_settings(monkeypatch):
     name, *others = TrackerConfig.preset_names()
     assert resolve(name).identity == resolve(name).identity
     assert resolve('mil').identity != resolve(name).identity
+
+
+def test_a_preset_that_lacks_something_is_left_out_with_the_reason(monkeypatch):
+    def refuse(config):
+        raise ConfigError('its weights are missing')
+    monkeypatch.setattr(preset, 'LMSCOTracker', refuse)
+    with pytest.raises(TrackerError, match="'hcs' cannot be built: its weights are missing"):
+        build_trackers(['hcs'])
+    specs, reasons = buildable_trackers()
+    assert len(reasons) == len(TrackerConfig.preset_names())
+    assert {spec.name for spec in specs} <= set(OPENCV_NAMES)
 
 
 def test_unknown_trackers_are_refused_with_the_known_ones():

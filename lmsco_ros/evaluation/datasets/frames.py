@@ -64,10 +64,12 @@ def without_false_color(image: npt.NDArray) -> npt.NDArray:
     """
     if image.ndim == 2:
         return image
-    if image.shape[2] == 4:
-        image = np.ascontiguousarray(image[..., :3])
-    spread = image.max(axis=2).astype(np.int32) - image.min(axis=2)
-    return image[..., 1].copy() if spread.max() <= _GRAY_TOLERANCE else image
+    blue, green, red = cv2.split(image)[:3]
+    spread = max(cv2.absdiff(*pair).max() for pair in
+                 ((blue, green), (green, red), (blue, red)))
+    if spread <= _GRAY_TOLERANCE:
+        return green
+    return image if image.shape[2] == 3 else np.ascontiguousarray(image[..., :3])
 
 
 class ImageFiles:

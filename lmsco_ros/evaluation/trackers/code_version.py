@@ -23,9 +23,9 @@ import lmsco_ros
 
 
 def core_version() -> str:
-    """Return a digest over all source files of the tracker core, 12 hexadecimal digits."""
+    """Return a digest over code and bundled weights of the core, 12 hexadecimal digits."""
     root = Path(lmsco_ros.__file__).parent / 'core'
-    return sources_digest(tuple(sorted(root.rglob('*.py'))))
+    return sources_digest((*sorted(root.rglob('*.py')), *sorted(root.rglob('*.safetensors'))))
 
 
 def sources_digest(paths: tuple[Path, ...]) -> str:

@@ -21,7 +21,8 @@ import json
 
 import numpy.typing as npt
 
-from lmsco_ros.core import BoundingBox, LMSCOTracker, TrackerConfig
+from lmsco_ros.core import BoundingBox, LMSCOError, LMSCOTracker, TrackerConfig
+from lmsco_ros.evaluation.errors import TrackerError
 from lmsco_ros.evaluation.trackers.code_version import core_version
 from lmsco_ros.evaluation.trackers.interface import Answer
 
@@ -78,5 +79,8 @@ class PresetSpec:
         return f'{core_version()} {json.dumps(settings, sort_keys=True, default=str)}'
 
     def build(self) -> PresetTracker:
-        """Return a tracker with the preset's settings."""
-        return PresetTracker(TrackerConfig.preset(self.name))
+        """Return a tracker, or raise `TrackerError` saying what the preset lacks here."""
+        try:
+            return PresetTracker(TrackerConfig.preset(self.name))
+        except LMSCOError as error:
+            raise TrackerError(f'preset {self.name!r} cannot be built: {error}') from error

@@ -33,7 +33,7 @@ from lmsco_ros.evaluation.trackers.trax_peer import TraxSpec
 
 
 def available_names() -> tuple[str, ...]:
-    """Return all names that work here without further files: presets, then peers."""
+    """Return all presets, then the peers that work here without further files."""
     peers = tuple(name for name in OPENCV_NAMES if OpenCVSpec(name).available)
     return tuple(TrackerConfig.preset_names()) + peers
 
