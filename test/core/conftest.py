@@ -24,6 +24,7 @@ from types import SimpleNamespace
 import array_api_compat.numpy as numpy_namespace
 import numpy as np
 import pytest
+from scipy.special import erf
 
 from lmsco_ros.core import BoundingBox
 from lmsco_ros.core.backend import Backend
@@ -239,30 +240,31 @@ class Scene:
         Width and height in pixels.
     seed : int
         Seed of the textures.
+    clutter : float
+        Contrast of the background, in counts.
 
     """
 
-    def __init__(self, size=(160, 128), seed=3):
-        self.size = size
+    def __init__(self, size=(160, 128), seed=3, clutter=30.0):
+        self.size, self.clutter = size, clutter
         rng = np.random.default_rng(seed)
         self._back = _waves(rng, 40, 0.03, 0.25)
         self._front = _waves(rng, 12, 0.5, 2.0)
 
-    def render(self, center=None, target=(24.0, 18.0)):
+    def render(self, center=None, target=(24.0, 18.0), pan=(0.0, 0.0), zoom=1.0):
         """Return the frame, in counts; without `center` the target is not there."""
         x, y = np.meshgrid(np.arange(self.size[0]) + 0.5, np.arange(self.size[1]) + 0.5)
-        counts = 7000 + 60 * _sum(self._back, x, y)
+        counts = 7000 + self.clutter * _sum(self._back, (x - pan[0]) / zoom, (y - pan[1]) / zoom)
         if center is not None:
             u, v = (x - center[0]) / target[0], (y - center[1]) / target[1]
             warm = 7500 + 80 * _sum(self._front, u, v)
-            # Pixels are integrals: the edge of the target is one pixel wide.
             mask = _edge(x - center[0], target[0]) * _edge(y - center[1], target[1])
             counts = counts + mask * (warm - counts)
         return counts
 
-    def frame(self, center=None, target=(24.0, 18.0)):
+    def frame(self, center=None, target=(24.0, 18.0), **camera):
         """Return the frame as a camera with 16 bits gives it."""
-        return np.round(self.render(center, target)).astype(np.uint16)
+        return np.round(self.render(center, target, **camera)).astype(np.uint16)
 
 
 def _waves(rng, count, low, high):
@@ -280,9 +282,10 @@ def _sum(waves, x, y):
     return total
 
 
-def _edge(distance, width):
-    """Return the part of each pixel that lies within width / 2 of the middle."""
-    return np.clip(width / 2 + 0.5 - np.abs(distance), 0, 1)
+def _edge(distance, width, blur=0.7):
+    """Return the part of each pixel within width / 2 of the middle, seen through optics."""
+    return (erf((width / 2 - distance) / (np.sqrt(2) * blur))
+            + erf((width / 2 + distance) / (np.sqrt(2) * blur))) / 2
 
 
 @pytest.fixture(scope='session')
