@@ -43,7 +43,7 @@ def run_one_pass(tracker: Tracker, sequence: TrackingSequence) -> Trace:
     """
     recorder = _Recorder(tracker, sequence)
     start = _next_start(sequence, 0)
-    if recorder.start(start):
+    if start is not None and recorder.start(start):
         for index in range(start + 1, len(sequence)):
             if not recorder.update(index):
                 break

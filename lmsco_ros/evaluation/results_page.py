@@ -123,8 +123,9 @@ def _names(run: EvaluationRun) -> list[tuple[str, int]]:
 def _scenes(run: EvaluationRun) -> list[tuple[str, Optional[tuple[str, ...]]]]:
     """Return the kinds of scene that the run has sequences of, then all together."""
     present = {sequence.group for sequence in run.sequences}
-    found = [(f'{scene.capitalize()} ({", ".join(groups)})', groups)
-             for scene, groups in load_split().scenes.items() if present & set(groups)]
+    found: list[tuple[str, Optional[tuple[str, ...]]]] = [
+        (f'{scene.capitalize()} ({", ".join(groups)})', groups)
+        for scene, groups in load_split().scenes.items() if present & set(groups)]
     return found + [('All sequences', None)] if len(found) != 1 else found
 
 

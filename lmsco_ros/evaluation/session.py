@@ -24,7 +24,7 @@ from typing import Any, Optional, Sequence
 
 from lmsco_ros.evaluation.datasets import BrokenSequence, scan_dataset, TrackingSequence
 from lmsco_ros.evaluation.environment import machine, versions
-from lmsco_ros.evaluation.errors import DatasetError, TrackerError
+from lmsco_ros.evaluation.errors import DatasetError, SequenceError, TrackerError
 from lmsco_ros.evaluation.split import load_split
 from lmsco_ros.evaluation.trackers import available_names, resolve, TrackerSpec
 
@@ -83,7 +83,8 @@ def select_sequences(request: Request) -> Selection:
         raise DatasetError(f'no usable sequence of {request.dataset} matches '
                            f'{request.pattern!r}{reasons}')
     if request.frames is not None:
-        chosen = [item.first(request.frames) for item in chosen]
+        chosen, empty = _cut(chosen, request.frames)
+        broken += empty
     return Selection(tuple(chosen), tuple(broken))
 
 
@@ -128,6 +129,18 @@ def describe(request: Request, jobs: int, skipped: Sequence[BrokenSequence]) -> 
         'date': date.today().isoformat(), 'machine': machine(), 'versions': dict(versions()),
         'skipped': [{'name': item.name, 'reason': item.reason} for item in skipped],
     }
+
+
+def _cut(sequences: Sequence[TrackingSequence], frames: int,
+         ) -> tuple[list[TrackingSequence], list[BrokenSequence]]:
+    """Return the sequences cut to their first frames, and those without a target there."""
+    kept, empty = [], []
+    for sequence in sequences:
+        try:
+            kept.append(sequence.first(frames))
+        except SequenceError as error:
+            empty.append(BrokenSequence(sequence.full_name, f'first {frames} frames: {error}'))
+    return kept, empty
 
 
 def _matches(full_name: str, pattern: str) -> bool:

@@ -71,7 +71,8 @@ def run_jobs(jobs: Sequence[Job], workers: int) -> Iterator[tuple[Job, Outcome]]
         Number of processes.
 
     """
-    pending, idle = deque(jobs), []
+    pending = deque(jobs)
+    idle: list[_Worker] = []
     busy: dict[Any, tuple[_Worker, Job]] = {}
     try:
         while pending or busy:

@@ -63,12 +63,12 @@ def test_evaluate_then_results(lmsco, dataset, scripted, tmp_path):
     assert '| Scripted |' in table.read_text(encoding='utf-8')
 
 
-def test_sequences_and_frames_narrow_the_work(lmsco, dataset, scripted, tmp_path):
+def test_sequences_and_frames_narrow_the_work_of_a_preset(lmsco, dataset, tmp_path):
     output = tmp_path / 'out'
-    result = lmsco('evaluate', dataset, '--tracker', scripted, '--output', output,
+    result = lmsco('evaluate', dataset, '--tracker', 'hcs', '--output', output,
                    '--sequences', 'ste*', '--frames', 5)
     assert result.exit_code == 0, result.output
-    assert [path.parent.name for path in output.rglob('records/**/*.json')] == ['Scripted']
+    assert [path.parent.name for path in output.rglob('records/**/*.json')] == ['hcs']
     assert 'torn' not in result.output
 
 

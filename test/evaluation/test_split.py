@@ -19,6 +19,7 @@ import pytest
 
 from lmsco_ros.evaluation.datasets import scan_dataset
 from lmsco_ros.evaluation.errors import DatasetError
+from lmsco_ros.evaluation.session import Request, select_sequences
 from lmsco_ros.evaluation.split import load_split
 from lmsco_ros.evaluation.split_selection import (
     clutter_around, Difficulty, hardest, measure, split_content)
@@ -83,3 +84,15 @@ def test_clips_with_several_targets_are_left_to_training(tmp_path, vot_folder):
     assert parts['test'] == {'anti_uav_ir': ['c'], 'ptb_tir': ['b'], 'vot_tir': ['a'],
                              'drone_ir': ['d']}
     assert parts['train'] == {'drone_ir': ['e']}
+
+
+def test_a_sequence_without_target_in_the_first_frames_is_reported(tmp_path, vot_folder):
+    vot_folder(tmp_path / 'here', [0] * 4)
+    late = vot_folder(tmp_path / 'late', [0] * 4)
+    rows = (late / 'groundtruth.txt').read_text(encoding='utf-8').splitlines()
+    (late / 'groundtruth.txt').write_text('\n'.join(['nan,nan,nan,nan'] * 2 + rows[2:]),
+                                          encoding='utf-8')
+    selection = select_sequences(Request(tmp_path, frames=2))
+    assert [item.name for item in selection.sequences] == ['here']
+    assert 'first 2 frames' in selection.broken[0].reason
+    assert len(select_sequences(Request(tmp_path, frames=3)).sequences) == 2

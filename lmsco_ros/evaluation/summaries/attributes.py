@@ -39,7 +39,8 @@ def summarize_attributes(run: EvaluationRun) -> dict[str, dict[str, AttributeFig
 
 def _pooled(run: EvaluationRun, tracker: str,
             names: tuple[str, ...]) -> dict[str, AttributeFigures]:
-    overlaps, counted, failures = [], [], []
+    overlaps, counted = [], []
+    failures: list[int] = []
     flags: dict[str, list] = {name: [] for name in names}
     first = 0
     for sequence, trace in zip(run.sequences, run.traces[tracker]):

@@ -66,10 +66,10 @@ class TraxTracker:
         self._process = subprocess.Popen(
             shlex.split(self._command), stdin=subprocess.PIPE, stdout=subprocess.PIPE,
             stderr=subprocess.DEVNULL)
-        streams = self._process.stdin.fileno(), self._process.stdout.fileno()
+        streams = [stream.fileno() for stream in (self._process.stdin, self._process.stdout)]
         try:
             # The library cannot be called without a log function.
-            self._client = self._trax.client.Client(stream=streams, log=lambda text: None)
+            self._client = self._trax.client.Client(stream=tuple(streams), log=lambda text: None)
             self._view = EightBitView(image)
             region = self._trax.region.Rectangle.create(*box.as_tuple())
             self._client.initialize(self._images(image), [(region, {})], {})
