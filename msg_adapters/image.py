@@ -30,14 +30,17 @@ from __future__ import annotations
 from array import array
 import sys
 from types import MappingProxyType
+from typing import TYPE_CHECKING
 
 import cv2
 import numpy as np
 import numpy.typing as npt
-from sensor_msgs.msg import CompressedImage, Image
-from std_msgs.msg import Header
 
 from msg_adapters.errors import ImageMessageError
+
+if TYPE_CHECKING:
+    from sensor_msgs.msg import CompressedImage, Image
+    from std_msgs.msg import Header
 
 # Encoding -> (type of one value, values in a pixel).
 ENCODINGS = MappingProxyType({
@@ -113,6 +116,10 @@ def message_from_image(image: npt.NDArray, *, encoding: str = '',
         When no encoding, or not the given one, fits the array.
 
     """
+    # Images of a bag are decoded where there are no messages to make.
+    from sensor_msgs.msg import Image
+    from std_msgs.msg import Header
+
     encoding = _fitting_encoding(image, encoding)
     pixels = cv2.cvtColor(image, cv2.COLOR_BGR2RGB) if encoding == 'rgb8' else image
     height, width = image.shape[:2]
@@ -178,6 +185,9 @@ def compressed_from_image(image: npt.NDArray, *, codec: str = 'png',
         When the codec is unknown or cannot hold the array.
 
     """
+    from sensor_msgs.msg import CompressedImage
+    from std_msgs.msg import Header
+
     if codec not in ('png', 'jpeg'):
         raise ImageMessageError(f'codec "{codec}" is unknown; expected "png" or "jpeg"')
     encoding = _fitting_encoding(image, '')

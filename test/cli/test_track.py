@@ -107,7 +107,7 @@ def test_broken_video(lmsco, tmp_path):
 
 
 @pytest.mark.parametrize('kind, blocked', [
-    ('folder', 'rclpy,sensor_msgs,std_msgs,geometry_msgs'), ('bag', 'rclpy')])
+    (kind, 'rclpy,sensor_msgs,std_msgs,geometry_msgs') for kind in ('folder', 'bag')])
 def test_recordings_are_tracked_without_ros(lmsco, tmp_path, scene_folder, start, kind, blocked):
     source = scene_folder
     if kind == 'bag':
