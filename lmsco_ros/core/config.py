@@ -26,7 +26,7 @@ import yaml
 from lmsco_ros.core.errors import ConfigError
 from lmsco_ros.core.validation import build, check_choice, check_range
 
-__all__ = ['ConfidenceConfig', 'FeatureConfig', 'IntensityConfig', 'LearningConfig',
+__all__ = ['ChannelConfig', 'ConfidenceConfig', 'FeatureConfig', 'IntensityConfig', 'LearningConfig',
            'RuntimeConfig', 'SamplingConfig', 'ScaleConfig', 'TrackerConfig']
 
 
@@ -85,32 +85,51 @@ class SamplingConfig:
 
 
 @dataclass(frozen=True)
-class FeatureConfig:
+class ChannelConfig:
     """
-    One block: feature channels on a common grid, which share a resolution.
+    A group of feature channels, normalized on its own.
 
     Attributes
     ----------
-    channels : tuple of {'hog', 'intensity'}
-        Groups of channels, each normalized on its own.
-    cell : int
-        Side of a cell in patch pixels.
+    kind : {'hog', 'intensity'}
+        What the channels are.
     weight : float
         Factor on the normalized channels.
 
     """
 
-    channels: tuple[str, ...]
-    cell: int = 4
+    kind: str
     weight: float = 1.0
 
     def __post_init__(self) -> None:
         """Check the ranges."""
-        if not self.channels or not set(self.channels) <= {'hog', 'intensity'}:
-            raise ConfigError(f'FeatureConfig.channels is {list(self.channels)}; expected some of '
-                              'hog, intensity')
-        check_range(self, 'cell', 1, 32)
+        check_choice(self, 'kind', ('hog', 'intensity'))
         check_range(self, 'weight', 0, 100, open_low=True)
+
+
+@dataclass(frozen=True)
+class FeatureConfig:
+    """
+    One block: groups of channels on a common grid.
+
+    Attributes
+    ----------
+    channels : tuple of ChannelConfig
+        The groups.
+    cell : int
+        Side of a cell in patch pixels.
+
+    """
+
+    channels: tuple[ChannelConfig, ...]
+    cell: int = 4
+
+    def __post_init__(self) -> None:
+        """Check the ranges."""
+        if not self.channels:
+            raise ConfigError('FeatureConfig.channels is empty; name at least one group, '
+                              'for instance {kind: hog}')
+        check_range(self, 'cell', 1, 32)
 
 
 @dataclass(frozen=True)
@@ -208,7 +227,7 @@ class ScaleConfig:
     """
 
     estimator: str = 'filter'
-    step: float = 1.03
+    step: float = 1.02
     exponent_min: int = -8
     exponent_max: int = 8
     learning_rate: float = 0.12
@@ -292,7 +311,7 @@ class RuntimeConfig:
 
 def _hcs_features() -> tuple[FeatureConfig, ...]:
     """Return the handcrafted block."""
-    return (FeatureConfig(('hog', 'intensity')),)
+    return (FeatureConfig((ChannelConfig('hog'), ChannelConfig('intensity', weight=2.0))),)
 
 
 @dataclass(frozen=True)
@@ -330,7 +349,7 @@ class TrackerConfig:
         check_range(self, 'newton_steps', 0, 100)
         if not self.features:
             raise ConfigError('TrackerConfig.features is empty; name at least one block, '
-                              'for instance {channels: [hog]}')
+                              'for instance {channels: [{kind: hog}]}')
 
     @classmethod
     def preset(cls, name: str) -> TrackerConfig:

@@ -48,14 +48,13 @@ class FeatureExtractor:
 
     def __init__(self, blocks: Sequence[FeatureConfig], size: int, backend: Backend) -> None:
         self._backend = backend
-        self._channels = [[_make_channels(name, block.cell) for name in block.channels]
-                          for block in blocks]
+        self._groups = [[(_make_channels(group.kind, block.cell), group.weight)
+                         for group in block.channels] for block in blocks]
         self._windows, self._kernels = [], []
         xp = backend.namespace
         for block in blocks:
             cells = size // block.cell
-            window = block.weight * hann_window(cells)
-            self._windows.append(window[:, :, None].astype(np.float32))
+            self._windows.append(hann_window(cells)[:, :, None].astype(np.float32))
             self._kernels.append(xp.asarray(interpolation_series(cells)[:, :, None],
                                             dtype=backend.complex, device=backend.device))
 
@@ -75,9 +74,10 @@ class FeatureExtractor:
 
         """
         result = []
-        for channels, window, kernel in zip(self._channels, self._windows, self._kernels,
-                                            strict=True):
-            block = np.concatenate([normalize(group(patch)) for group in channels], axis=-1)
+        for groups, window, kernel in zip(self._groups, self._windows, self._kernels,
+                                          strict=True):
+            block = np.concatenate([weight * normalize(channels(patch))
+                                    for channels, weight in groups], axis=-1)
             block *= window
             result.append(interpolate(self._backend.asarray(block), kernel))
         return result
@@ -95,8 +95,8 @@ def hann_window(size: int) -> np.ndarray:
     return axis[:, None] * axis[None, :]
 
 
-def _make_channels(name: str, cell: int) -> Channels:
+def _make_channels(kind: str, cell: int) -> Channels:
     """Return the function that computes a group of channels, shape (N, N, C), of a patch."""
-    if name == 'hog':
+    if kind == 'hog':
         return lambda patch: hog(patch[None], cell)[0]
     return lambda patch: intensity_channels(patch, cell)
