@@ -27,7 +27,13 @@ import pytest
 from scipy.special import erf
 
 from lmsco_ros.core import BoundingBox
-from lmsco_ros.core.backend import Backend
+from lmsco_ros.core.backend import Backend, limit_threads
+
+
+@pytest.fixture(scope='session', autouse=True)
+def single_thread():
+    """Let small arrays be computed by one thread, whatever else the machine does."""
+    limit_threads(1)
 
 
 @pytest.fixture

@@ -165,8 +165,8 @@ def test_residual_is_the_negative_half_gradient(make, rng, anchor):
 def test_converged_gradient_steps_agree_with_the_dense_solve(make, anchor):
     training = make(anchor)
     coordinates = np.zeros(len(training.dense.penalty))
-    for _ in range(3):
-        training.optimizer.optimize(1, 150)
+    for _ in range(2):
+        training.optimizer.optimize(1, 120)
         coordinates = np.linalg.solve(training.matrix(), training.right_hand_side(coordinates))
         np.testing.assert_allclose(training.dense.pack(training.optimizer.filters), coordinates,
                                    atol=1e-4 * np.abs(coordinates).max())

@@ -22,13 +22,14 @@ import yaml
 
 from lmsco_ros.core import ConfigError, TrackerConfig
 from lmsco_ros.core.config import (
-    ConfidenceConfig, FeatureConfig, IntensityConfig, LearningConfig, RuntimeConfig,
+    ChannelConfig, ConfidenceConfig, FeatureConfig, IntensityConfig, LearningConfig, RuntimeConfig,
     SamplingConfig, ScaleConfig)
 
 features = st.builds(
-    FeatureConfig, st.lists(st.sampled_from(['hog', 'intensity']), min_size=1, max_size=2,
-                            unique=True).map(tuple),
-    cell=st.sampled_from([2, 4, 8]), weight=st.floats(0.01, 100))
+    FeatureConfig, st.lists(
+        st.builds(ChannelConfig, st.sampled_from(['hog', 'intensity']), st.floats(0.01, 100)),
+        min_size=1, max_size=2).map(tuple),
+    cell=st.sampled_from([2, 4, 8]))
 configs = st.builds(
     TrackerConfig,
     features=st.lists(features, min_size=1, max_size=3).map(tuple),
@@ -62,7 +63,8 @@ def test_plain_values_survive_yaml(config):
 
 def test_file_round_trip(tmp_path):
     config = replace(TrackerConfig(), newton_steps=3, scale=ScaleConfig(step=1.07),
-                     features=(FeatureConfig(('intensity',), 8, 0.5), FeatureConfig(('hog',), 4)))
+                     features=(FeatureConfig((ChannelConfig('intensity', 0.5),), 8),
+                               FeatureConfig((ChannelConfig('hog'),), 4)))
     config.to_yaml(tmp_path / 'c.yaml')
     assert TrackerConfig.from_yaml(tmp_path / 'c.yaml') == config
     assert TrackerConfig.from_yaml(str(tmp_path / 'c.yaml')) == config
@@ -91,8 +93,8 @@ def test_partial_configuration_changes_only_what_it_names():
 
 
 def test_list_replaces_the_whole_list():
-    changed = TrackerConfig.from_dict({'features': [{'channels': ['intensity'], 'cell': 8}]})
-    assert changed.features == (FeatureConfig(('intensity',), cell=8),)
+    changed = TrackerConfig.from_dict({'features': [{'channels': [{'kind': 'intensity'}], 'cell': 8}]})
+    assert changed.features == (FeatureConfig((ChannelConfig('intensity'),), cell=8),)
 
 
 def test_empty_configuration_is_the_default(tmp_path):
@@ -117,7 +119,8 @@ def test_given_mapping_is_left_alone():
     ({'lerning': {}}, 'lerning', 'learning'),
     ({'learning': {'memory_sise': 3}}, 'learning.memory_sise', 'memory_size'),
     ({'scale': {'exponent_mx': 3}}, 'scale.exponent_mx', 'exponent_max'),
-    ({'features': [{'channels': ['hog'], 'cels': 3}]}, r'features\[0\].cels', 'cell'),
+    ({'features': [{'channels': [], 'cels': 3}]}, r'features\[0\].cels', 'cell'),
+    ({'features': [{'channels': [{'knd': 'hog'}]}]}, r'features\[0\].channels\[0\].knd', 'kind'),
     ({'newton_step': 3}, 'newton_step', 'newton_steps'),
     ({7: 3}, '7', ''),
 ])
@@ -149,7 +152,8 @@ def test_misspelled_key_is_found_again(config, section, position, letter):
     ({'features': 'hog'}, "features is 'hog'; expected a list"),
     ({'features': ['hog']}, r"features\[0\] is 'hog'; expected keys and values"),
     ({'features': [{'channels': 'hog'}]}, r"features\[0\].channels is 'hog'; expected a list"),
-    ({'features': [{'channels': [3]}]}, r'features\[0\].channels\[0\] is 3; expected a str'),
+    ({'features': [{'channels': [3]}]}, r'channels\[0\] is 3; expected keys and values'),
+    ({'features': [{'channels': [{'kind': 3}]}]}, r'channels\[0\].kind is 3; expected a str'),
     ({'features': []}, 'features is empty; name at least one block'),
 ])
 def test_wrong_types_are_refused(data, reason):
@@ -209,12 +213,16 @@ def test_choices_are_listed(section, name, choices):
         TrackerConfig.from_dict({section: {name: 'other'}})
 
 
-@pytest.mark.parametrize('values', [{'channels': ('hog', 'color')}, {'channels': ()},
-                                    {'channels': ('hog',), 'cell': 0},
-                                    {'channels': ('hog',), 'weight': 0}])
-def test_features_are_checked(values):
-    with pytest.raises(ConfigError, match='expected'):
-        FeatureConfig(**values)
+@pytest.mark.parametrize('block, reason', [
+    ({'channels': []}, 'channels is empty; name at least one'),
+    ({'channels': [{'kind': 'hog'}], 'cell': 0}, r'FeatureConfig.cell is 0; expected'),
+    ({'channels': [{'kind': 'hog'}], 'cell': 33}, r'FeatureConfig.cell is 33; expected'),
+    ({'channels': [{'kind': 'hog', 'weight': 0}]}, r'ChannelConfig.weight is 0.*; expected'),
+    ({'channels': [{'kind': 'color'}]}, "kind is 'color'; expected one of hog, intensity"),
+])
+def test_features_are_checked(block, reason):
+    with pytest.raises(ConfigError, match=reason):
+        TrackerConfig.from_dict({'features': [block]})
 
 
 @pytest.mark.parametrize('text, reason', [

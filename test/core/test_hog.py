@@ -20,7 +20,7 @@ import cv2
 import numpy as np
 import pytest
 
-from lmsco_ros.core.config import FeatureConfig
+from lmsco_ros.core.config import ChannelConfig, FeatureConfig
 from lmsco_ros.core.features.extractor import FeatureExtractor, hann_window, normalize
 from lmsco_ros.core.features.hog import hog, HOG_CHANNELS
 from lmsco_ros.core.features.intensity_channels import intensity_channels
@@ -152,22 +152,26 @@ def test_window_has_no_zero_ends():
 
 
 def test_blocks_have_the_order_and_resolution_of_the_configuration(backend, rng):
-    blocks = (FeatureConfig(('hog', 'intensity'), cell=4), FeatureConfig(('intensity',), cell=8))
+    blocks = (FeatureConfig((ChannelConfig('hog'), ChannelConfig('intensity')), cell=4),
+              FeatureConfig((ChannelConfig('intensity'),), cell=8))
     series = FeatureExtractor(blocks, 72, backend)(texture(rng, (72, 72)))
     assert [s.shape for s in series] == [(17, 9, 33), (9, 5, 2)]
 
 
-def test_weight_scales_a_block(backend, rng):
+def test_weight_scales_a_group(backend, rng):
     patch = texture(rng, (36, 36))
-    one, = FeatureExtractor([FeatureConfig(('hog',), 4, 1.0)], 36, backend)(patch)
-    two, = FeatureExtractor([FeatureConfig(('hog',), 4, 2.5)], 36, backend)(patch)
-    np.testing.assert_allclose(two, 2.5 * one, atol=1e-5)
+    one, two = (FeatureExtractor([FeatureConfig(
+        (ChannelConfig('hog'), ChannelConfig('intensity', weight)), 4)], 36, backend)(patch)[0]
+        for weight in (1.0, 2.5))
+    np.testing.assert_allclose(two[:, :, :31], one[:, :, :31], atol=1e-6)
+    np.testing.assert_allclose(two[:, :, 31:], 2.5 * one[:, :, 31:], atol=1e-5)
 
 
 def test_groups_share_a_block_at_equal_strength(backend, rng):
     patch = texture(rng, (60, 60))
-    together, = FeatureExtractor([FeatureConfig(('hog', 'intensity'), 4)], 60, backend)(patch)
-    for name, part in [('hog', together[:, :, :31]), ('intensity', together[:, :, 31:])]:
-        alone, = FeatureExtractor([FeatureConfig((name,), 4)], 60, backend)(patch)
+    groups = (ChannelConfig('hog'), ChannelConfig('intensity'))
+    together, = FeatureExtractor([FeatureConfig(groups, 4)], 60, backend)(patch)
+    for group, part in zip(groups, (together[:, :, :31], together[:, :, 31:]), strict=True):
+        alone, = FeatureExtractor([FeatureConfig((group,), 4)], 60, backend)(patch)
         np.testing.assert_allclose(part, alone, atol=1e-6)
         assert 0.01 < mean_of_squares(part).mean() < 1

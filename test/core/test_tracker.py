@@ -22,12 +22,12 @@ from lmsco_ros.core import (
     BoundingBox, BoxError, ImageError, LMSCOError, LMSCOTracker, NotInitializedError,
     TrackerConfig, TrackResult, TrackState)
 from lmsco_ros.core.config import (
-    ConfidenceConfig, FeatureConfig, LearningConfig, SamplingConfig, ScaleConfig)
+    ChannelConfig, ConfidenceConfig, FeatureConfig, LearningConfig, SamplingConfig, ScaleConfig)
 
 
 # Small, since most of what is asked here does not depend on accuracy.
 FAST = TrackerConfig(
-    features=(FeatureConfig(('hog', 'intensity'), 4),),
+    features=(FeatureConfig((ChannelConfig('hog'), ChannelConfig('intensity')), 4),),
     sampling=SamplingConfig(search_factor=4.0, patch_size_min=84, patch_size_max=84),
     learning=LearningConfig(initial_iterations=10, iterations=2, gradient_steps=2,
                             memory_size=5, update_interval=2),
@@ -279,7 +279,8 @@ def test_default_configuration_needs_no_argument(scene):
     ids=['coupled', 'per_block', 'ridge', 'one_sample'])
 def test_every_way_of_learning_tracks(scene, learning):
     config = TrackerConfig(
-        features=(FeatureConfig(('hog',), 4), FeatureConfig(('intensity',), 4)),
+        features=(FeatureConfig((ChannelConfig('hog'),), 4),
+                  FeatureConfig((ChannelConfig('intensity'),), 4)),
         sampling=FAST.sampling, learning=learning, scale=ScaleConfig(estimator='none'),
         confidence=ConfidenceConfig(tiles=0))
     last = walk(scene, 9, config)[-1]

