@@ -22,6 +22,7 @@ from typing import Iterable, Mapping, Optional, Sequence
 from lmsco_ros.evaluation.errors import DatasetError
 from lmsco_ros.evaluation.execution import PROTOCOLS
 from lmsco_ros.evaluation.report.conditions import conditions, problems
+from lmsco_ros.evaluation.report.formatting import spread_warning
 from lmsco_ros.evaluation.report.tables import (
     Cell, confidence_table, difference_rows, DifferenceRow, one_pass_table, supervised_table,
     Table)
@@ -132,7 +133,8 @@ def _scenes(run: EvaluationRun) -> list[tuple[str, Optional[tuple[str, ...]]]]:
 def _scene(title: str, runs: Mapping[str, EvaluationRun]) -> list[str]:
     main = next(iter(runs.values()))
     frames = sum(len(sequence.ground_truth) for sequence in main.sequences)
-    parts = [f'## {title}\n', f'{len(main.sequences)} sequences, {frames} frames.\n']
+    count = f'{len(main.sequences)} sequences, {frames} frames.'
+    parts = [f'## {title}\n', f'{count} {spread_warning(len(main.sequences))}'.strip() + '\n']
     if 'ope' in runs:
         summaries = summarize_one_pass(runs['ope'])
         aucs = {item.tracker: item.aucs for item in summaries}

@@ -20,7 +20,7 @@ from pathlib import Path
 from typing import Any, Iterator, Mapping, Sequence
 
 from lmsco_ros.evaluation.datasets import BrokenSequence, TrackingSequence
-from lmsco_ros.evaluation.errors import SequenceError
+from lmsco_ros.evaluation.errors import DatasetError, SequenceError
 from lmsco_ros.evaluation.record_store import RecordStore
 from lmsco_ros.evaluation.run_file import SequenceInfo, write_run
 from lmsco_ros.evaluation.trackers import TrackerSpec
@@ -72,8 +72,24 @@ class Evaluation:
             yield job, outcome
 
     def finish(self, context: Mapping[str, Any]) -> None:
-        """Write the run file; `context` says how the run was made."""
+        """
+        Write the run file.
+
+        Parameters
+        ----------
+        context : mapping
+            How the run was made.
+
+        Raises
+        ------
+        DatasetError
+            When every sequence turned out to be broken.
+
+        """
         kept = [sequence for sequence in self._sequences if sequence.full_name in self._infos]
+        if not kept:
+            reasons = '; '.join(f'{item.name}: {item.reason}' for item in self.skipped)
+            raise DatasetError(f'no sequence could be evaluated: {reasons}')
         records = {tracker.name: [str(self._store.path(Job(tracker, sequence, self._protocol)))
                                   for sequence in kept] for tracker in self._trackers}
         infos = tuple(self._infos[sequence.full_name] for sequence in kept)

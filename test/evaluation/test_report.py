@@ -23,7 +23,7 @@ from lmsco_ros.evaluation.datasets import scan_dataset
 from lmsco_ros.evaluation.protocols.bootstrap import Estimate
 from lmsco_ros.evaluation.report.conditions import command_line
 from lmsco_ros.evaluation.report.failures import worst_failures
-from lmsco_ros.evaluation.report.formatting import interval, is_real, number, signed
+from lmsco_ros.evaluation.report.formatting import interval, number, signed, spread_warning
 from lmsco_ros.evaluation.report.page import write_report
 from lmsco_ros.evaluation.report.pictures import encode, failure_strip, thumbnail
 from lmsco_ros.evaluation.results_page import results_page
@@ -183,4 +183,4 @@ def test_figures_as_text():
     assert interval(Estimate(.5, .4, .6)) == '.400 – .600'
     assert interval(Estimate(.5, float('nan'), float('nan'))) == ''
     assert signed(Estimate(.1, .05, .2)) == '+.100'
-    assert is_real(Estimate(.1, .05, .2)) and not is_real(Estimate(.1, -.05, .2))
+    assert 'fewer than 6 sequences' in spread_warning(5) and not spread_warning(6)

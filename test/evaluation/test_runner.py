@@ -20,6 +20,7 @@ import numpy as np
 import pytest
 
 from lmsco_ros.evaluation.datasets import scan_dataset
+from lmsco_ros.evaluation.errors import DatasetError
 from lmsco_ros.evaluation.record_store import read_record, write_json
 from lmsco_ros.evaluation.run_file import read_run
 from lmsco_ros.evaluation.runner import Evaluation
@@ -90,6 +91,15 @@ def test_a_sequence_that_breaks_on_the_way_is_skipped_for_all(tmp_path, evaluati
     assert '00000003.png' in plan.skipped[0].reason
     names = [sequence.name for sequence in read_run(tmp_path / 'out', 'ope').sequences]
     assert names == ['deadly', 'rough']
+
+
+def test_a_run_of_broken_sequences_only_is_an_error(evaluation, dataset):
+    for image in dataset.rglob('*.png'):
+        image.write_bytes(b'no image')
+    plan = evaluation()
+    assert not plan.pending
+    with pytest.raises(DatasetError, match='data/calm: 00000001.png is not a readable image'):
+        plan.finish({})
 
 
 def test_records_are_complete_or_absent(tmp_path):

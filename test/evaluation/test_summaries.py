@@ -19,7 +19,6 @@ import math
 import numpy as np
 import pytest
 
-from lmsco_ros.evaluation.protocols.bootstrap import Estimate
 from lmsco_ros.evaluation.run_file import EvaluationRun, SequenceInfo
 from lmsco_ros.evaluation.summaries.attributes import attribute_names, summarize_attributes
 from lmsco_ros.evaluation.summaries.confidence import summarize_confidence
@@ -128,4 +127,12 @@ def test_differences_are_to_csrt_or_the_first():
     assert row.difference.value == pytest.approx((.4 + .3 - .1) / 3)
     (reverse,) = differences(figures, higher_is_better=False)
     assert (reverse.better, reverse.worse) == (1, 2)
-    assert isinstance(row.difference, Estimate)
+
+
+@pytest.mark.parametrize(('sequences', 'gain', 'real'), [
+    (6, .1, True), (6, -.1, True), (5, .1, False), (6, 0, False)])
+def test_a_difference_is_real_with_enough_sequences_and_an_interval_beside_zero(
+        sequences, gain, real):
+    values = np.linspace(.2, .8, sequences)
+    (row,) = differences({'hcs': values + gain, 'csrt': values}, higher_is_better=True)
+    assert row.real is real

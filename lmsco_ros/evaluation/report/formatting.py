@@ -19,6 +19,7 @@ from __future__ import annotations
 import math
 
 from lmsco_ros.evaluation.protocols.bootstrap import Estimate
+from lmsco_ros.evaluation.summaries.differences import enough_sequences, FEWEST_SEQUENCES
 
 NONE = '–'
 
@@ -46,6 +47,9 @@ def signed(estimate: Estimate, decimals: int = 3) -> str:
     return f'+{text}' if estimate.value > 0 else text
 
 
-def is_real(difference: Estimate) -> bool:
-    """Return whether the interval of a difference excludes zero."""
-    return difference.low > 0 or difference.high < 0
+def spread_warning(sequences: int) -> str:
+    """Return what must be said of intervals over so few sequences; empty when enough."""
+    if enough_sequences(sequences):
+        return ''
+    return (f'With fewer than {FEWEST_SEQUENCES} sequences an interval shows no more than the '
+            'spread between them, and no difference can be called real.')

@@ -30,7 +30,7 @@ import numpy as np
 from lmsco_ros.evaluation.datasets import TrackingSequence
 from lmsco_ros.evaluation.report.conditions import conditions, problems
 from lmsco_ros.evaluation.report.failures import worst_failures
-from lmsco_ros.evaluation.report.formatting import number
+from lmsco_ros.evaluation.report.formatting import number, spread_warning
 from lmsco_ros.evaluation.report.one_pass_plots import one_pass_plots
 from lmsco_ros.evaluation.report.pictures import (
     encode, failure_strip, thumbnail, TRUTH_COLOR)
@@ -78,13 +78,15 @@ def write_report(output: Path, runs: Mapping[str, EvaluationRun],
 
     """
     main = runs.get('ope') or runs['vot']
+    caution = spread_warning(len(main.sequences))
     pictures = output / 'pictures'
     pictures.mkdir(parents=True, exist_ok=True)
     trackers = dict.fromkeys(name for run in runs.values() for name in run.trackers)
     colors = {name: look.color for name, look in looks(trackers).items()}
     page = _template().render(
         title=_TITLE, subtitle=_subtitle(main, trackers), colors=colors,
-        truth_color=TRUTH_COLOR, problems=problems(runs), conditions=conditions(runs),
+        truth_color=TRUTH_COLOR, problems=[caution] * bool(caution) + problems(runs),
+        conditions=conditions(runs),
         ope=_one_pass(runs['ope'], pictures) if 'ope' in runs else None,
         vot=_supervised(runs['vot'], pictures) if 'vot' in runs else None,
         failures=list(_failures(main, sequences, colors, pictures)),

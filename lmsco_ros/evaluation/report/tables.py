@@ -21,7 +21,7 @@ import math
 from typing import Callable, Generic, Optional, Sequence, TypeVar
 
 from lmsco_ros.evaluation.protocols.bootstrap import Estimate
-from lmsco_ros.evaluation.report.formatting import interval, is_real, number, signed
+from lmsco_ros.evaluation.report.formatting import interval, number, signed
 from lmsco_ros.evaluation.summaries.confidence import ConfidenceSummary
 from lmsco_ros.evaluation.summaries.differences import Difference
 from lmsco_ros.evaluation.summaries.one_pass import OnePassSummary
@@ -143,7 +143,7 @@ def difference_rows(differences: Sequence[Difference], decimals: int) -> tuple[D
     return tuple(
         DifferenceRow(item.tracker, item.reference,
                       Cell(signed(item.difference, decimals),
-                           interval(item.difference, decimals), is_real(item.difference)),
+                           interval(item.difference, decimals), item.real),
                       item.better, item.worse)
         for item in differences)
 

@@ -24,17 +24,47 @@ from lmsco_ros.evaluation.protocols.bootstrap import Estimate, paired_difference
 
 # The peer that everything is compared with where it took part.
 _USUAL_REFERENCE = 'csrt'
+FEWEST_SEQUENCES = 6
 
 
 @dataclass(frozen=True)
 class Difference:
-    """Mean of `tracker` - `reference` over sequences, and how many sequences it won."""
+    """
+    One tracker against another.
+
+    Attributes
+    ----------
+    tracker, reference : str
+        Names.
+    difference : Estimate
+        Mean of `tracker` - `reference` over sequences.
+    sequences, better, worse : int
+        Number of sequences, and on how many of them `tracker` was better or worse.
+
+    """
 
     tracker: str
     reference: str
     difference: Estimate
+    sequences: int
     better: int
     worse: int
+
+    @property
+    def real(self) -> bool:
+        """Whether the interval leaves out zero, and enough sequences stand behind it."""
+        interval = self.difference
+        return enough_sequences(self.sequences) and (interval.low > 0 or interval.high < 0)
+
+
+def enough_sequences(sequences: int) -> bool:
+    """
+    Return whether so many sequences can tell trackers apart at all.
+
+    With fewer than six even a sign test on results that all point one way stays above
+    the 5 % level, and a bootstrap interval shows no more than the spread.
+    """
+    return sequences >= FEWEST_SEQUENCES
 
 
 def reference_of(trackers: tuple[str, ...]) -> Optional[str]:
@@ -67,5 +97,6 @@ def differences(figures: Mapping[str, Array],
             gain = margin if higher_is_better else -margin
             result.append(Difference(
                 name, reference, paired_difference(values, figures[reference]),
-                better=int((gain > 0).sum()), worse=int((gain < 0).sum())))
+                sequences=len(values), better=int((gain > 0).sum()),
+                worse=int((gain < 0).sum())))
     return tuple(result)
