@@ -120,7 +120,8 @@ def test_given_mapping_is_left_alone():
     ({'learning': {'memory_sise': 3}}, 'learning.memory_sise', 'memory_size'),
     ({'scale': {'exponent_mx': 3}}, 'scale.exponent_mx', 'exponent_max'),
     ({'features': [{'channels': [], 'cels': 3}]}, r'features\[0\].cels', 'cell'),
-    ({'features': [{'channels': [{'knd': 'hog'}]}]}, r'features\[0\].channels\[0\].knd', 'kind'),
+    ({'features': [{'channels': [{'knd': 'hog'}]}]},
+     r'features\[0\].channels\[0\].knd', 'kind'),
     ({'newton_step': 3}, 'newton_step', 'newton_steps'),
     ({7: 3}, '7', ''),
 ])

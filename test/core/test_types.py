@@ -48,7 +48,7 @@ def test_scaling_keeps_center_and_shape(box, factor):
 @given(one=boxes, other=boxes)
 def test_overlap_is_symmetric_and_bounded(one, other):
     assert one.overlap(other) == pytest.approx(other.overlap(one))
-    assert 0 <= one.overlap(other) <= 1 + 1e-12
+    assert 0 <= one.overlap(other) <= 1 + 1e-8  # rounding of the far sides
     assert one.intersection(other) <= min(one.area, other.area) * (1 + 1e-9)
     assert one.overlap(one) == pytest.approx(1, rel=1e-6)
 
