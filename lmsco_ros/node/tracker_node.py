@@ -17,8 +17,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+import contextlib
 import functools
+import signal
 import sys
 import traceback
 from typing import Any
@@ -28,11 +30,11 @@ from rcl_interfaces.msg import SetParametersResult
 import rclpy
 from rclpy.clock import Clock, ClockType
 from rclpy.exceptions import ParameterException
-from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
-from rclpy.impl.implementation_singleton import rclpy_implementation
+from rclpy.executors import SingleThreadedExecutor
 from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
 from rclpy.parameter import Parameter
 from rclpy.service import Service
+from rclpy.signals import SignalHandlerOptions
 from std_msgs.msg import Header
 from std_srvs.srv import SetBool, Trigger
 
@@ -47,6 +49,8 @@ from lmsco_ros.node.worker import Tracker
 from msg_adapters.status import message_from_diagnoses
 
 _HEALTH_PERIOD = 1.0
+# A signal is noticed after this time at the latest.
+_SIGNAL_PERIOD = 0.1
 _NOT_ACTIVE = 'the node is not active; activate it first'
 
 _Transition = Callable[['TrackerNode', LifecycleState], TransitionCallbackReturn]
@@ -231,31 +235,52 @@ class TrackerNode(LifecycleNode):
             self._outputs.settings = self.settings
 
 
-def main(args: list[str] | None = None) -> int:
-    """Run the node until a signal comes; return the exit code."""
-    rclpy.init(args=args)
-    node = None
+@contextlib.contextmanager
+def _noted_signals() -> Iterator[list[int]]:
+    """
+    Collect SIGINT and SIGTERM in the list that is yielded.
+
+    The handlers of rclpy would take the context away under the hands of whoever is using it:
+    a node that is being made, the worker that publishes.
+    """
+    noted: list[int] = []
+    before = {number: signal.signal(number, lambda number, frame: noted.append(number))
+              for number in (signal.SIGINT, signal.SIGTERM)}
+    try:
+        yield noted
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+
+def _run(noted: list[int]) -> int:
+    """Make a node, let it work until a signal is noted, and take it down."""
+    executor = SingleThreadedExecutor()
     try:
         node = TrackerNode()
-        if node.settings.autostart and not node.is_active:
-            return 1
-        executor = SingleThreadedExecutor()
-        executor.add_node(node)
-        executor.spin()
-    except (KeyboardInterrupt, ExternalShutdownException):
-        pass
     except ParameterException as error:
         print(f'tracker_node: {error}', file=sys.stderr)
         return 1
-    except rclpy_implementation.RCLError:
-        # A signal may surface as the error of whatever used the context at that moment.
-        if rclpy.ok():
-            raise
+    try:
+        if node.settings.autostart and not node.is_active:
+            return 1
+        executor.add_node(node)
+        while not noted and rclpy.ok():
+            executor.spin_once(timeout_sec=_SIGNAL_PERIOD)
+        return 0
     finally:
-        if node is not None:
-            node.destroy_node()
-        rclpy.try_shutdown()
-    return 0
+        node.destroy_node()
+        executor.shutdown()
+
+
+def main(args: list[str] | None = None) -> int:
+    """Run the node until SIGINT or SIGTERM comes; return the exit code."""
+    with _noted_signals() as noted:
+        rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
+        try:
+            return _run(noted)
+        finally:
+            rclpy.try_shutdown()
 
 
 if __name__ == '__main__':
