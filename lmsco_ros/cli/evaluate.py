@@ -122,6 +122,8 @@ def _run(evaluation: Evaluation, jobs: int) -> None:
     if evaluation.done:
         say(f'{len(evaluation.done)} results are there already, '
             f'{len(evaluation.pending)} to go')
+    if not evaluation.pending:
+        return
     with frame_progress() as progress:
         total = sum(len(job.sequence) for job in evaluation.pending)
         task = progress.add_task('evaluating', total=total)
