@@ -93,7 +93,8 @@ def test_partial_configuration_changes_only_what_it_names():
 
 
 def test_list_replaces_the_whole_list():
-    changed = TrackerConfig.from_dict({'features': [{'channels': [{'kind': 'intensity'}], 'cell': 8}]})
+    blocks = [{'channels': [{'kind': 'intensity'}], 'cell': 8}]
+    changed = TrackerConfig.from_dict({'features': blocks})
     assert changed.features == (FeatureConfig((ChannelConfig('intensity'),), cell=8),)
 
 

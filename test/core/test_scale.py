@@ -65,6 +65,16 @@ def test_filter_recovers_known_changes(view, box_at, size):
     assert np.abs(errors).max() < 0.02
 
 
+@pytest.mark.parametrize('factor', [1.06**-0.5, 1.06**0.5])
+def test_estimate_is_refined_between_the_scales(view, box_at, factor):
+    # The nearest scales are 3 % away.
+    config = ScaleConfig(**{**CONFIG.__dict__, 'step': 1.06})
+    estimator = ScaleFilter(config, (24.0, 18.0))
+    estimator.learn(view((24.0, 18.0)), box_at(CENTER))
+    estimate = estimator.estimate(view(scaled((24.0, 18.0), factor)), box_at(CENTER))
+    assert estimate == pytest.approx(factor, rel=0.015)
+
+
 @pytest.mark.parametrize('factor', [0.85, 0.92, 1.1, 1.18])
 def test_large_changes_are_found_in_a_few_frames(view, box_at, factor):
     size = (24.0, 18.0)
