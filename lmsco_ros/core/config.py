@@ -311,7 +311,7 @@ class RuntimeConfig:
 
 def _hcs_features() -> tuple[FeatureConfig, ...]:
     """Return the handcrafted block."""
-    return (FeatureConfig((ChannelConfig('hog'), ChannelConfig('intensity', weight=2.0))),)
+    return (FeatureConfig((ChannelConfig('hog'), ChannelConfig('intensity', weight=4.0))),)
 
 
 @dataclass(frozen=True)

@@ -120,8 +120,7 @@ class Track:
 
     def first_result(self) -> TrackResult:
         """Return the result of the first frame: the given box."""
-        return TrackResult(self._box, 1.0, TrackState.TRACKING,
-                           centered_map(self._first.peak.grid), self._first.region)
+        return self._result(self._first, 1.0, TrackState.TRACKING)
 
     def advance(self, image: np.ndarray) -> TrackResult:
         """Find the target in the next frame, and learn from it if it can be trusted."""
@@ -135,8 +134,12 @@ class Track:
         if believed:
             self._follow(view, detection)
             self._learn(view, detection)
-        return TrackResult(self._box, self._monitor.score(detection.sharpness), state,
-                           centered_map(detection.peak.grid), detection.region)
+        return self._result(detection, self._monitor.score(detection.sharpness), state)
+
+    def _result(self, detection: Detection, score: float, state: TrackState) -> TrackResult:
+        """Return what there is to say; the target in the first frame scores 1 in the map."""
+        confidence_map = centered_map(detection.peak.grid / self._first.peak.value)
+        return TrackResult(self._box, score, state, confidence_map, detection.region)
 
     def _learn_first(self, view: FrameView, backend: Backend) -> StructuredOperator:
         """Train the filter on the first frame."""

@@ -121,7 +121,8 @@ class TrackResult:
         TRACKING, UNCERTAIN (found, but not learned from) or LOST.
     confidence_map : ndarray, shape (n, n), float32
         Score of the structured correlation filter over `search_region` at the
-        winning scale; cell (i, j) covers one n-th of the region in each direction.
+        winning scale, in units of the target's score in the first frame; cell (i, j)
+        covers one n-th of the region in each direction.
     search_region : BoundingBox
         Region of the image that `confidence_map` covers; may exceed the image.
 

@@ -86,7 +86,7 @@ class TrackingSession:
             if outcome.phase is Phase.FAILED:
                 log.error(f'the tracker failed, the target is dropped: {outcome.error}')
             elif outcome.phase is Phase.REFUSED:
-                log.error(outcome.error)
+                log.error(outcome.error, throttle_duration_sec=_QUIET_SECONDS)
         except Exception:  # noqa: B902
             # A signal invalidates the publishers at any moment; anything else is a mistake.
             if self._node.context.ok():

@@ -30,6 +30,7 @@ from typing import Any, Protocol
 
 import numpy.typing as npt
 
+from lmsco_ros.core.errors import LMSCOError
 from lmsco_ros.core.types import BoundingBox, TrackResult
 from lmsco_ros.node.history import FrameHistory, NANOSECONDS
 from lmsco_ros.node.mailbox import Mailbox
@@ -88,8 +89,8 @@ class Outcome:
     ----------
     frame : Frame
     phase : Phase
-        TRACKED (there is a result), IDLE (no target), DISABLED, REFUSED (a request could
-        not be met; nothing changed) or FAILED (the tracker raised; the target is dropped).
+        TRACKED (there is a result), IDLE (no target), DISABLED, REFUSED (a request or a
+        frame could not be used; nothing changed) or FAILED (the tracker raised; the target is dropped).
     result : TrackResult or None
         Only when TRACKED.
     track_id : int
@@ -315,9 +316,14 @@ class TrackerWorker:
             self._report(item, Phase.REFUSED,
                          'cannot start while tracking is disabled; enable it first')
             return
-        self._track_id += 1
-        self._has_target = True
-        self._track(item, lambda: self._tracker.initialize(item.frame.image, item.box))
+
+        def start() -> TrackResult:
+            result = self._tracker.initialize(item.frame.image, item.box)
+            self._track_id += 1
+            self._has_target = True
+            return result
+
+        self._track(item, start)
 
     def _refuse(self, item: _Refuse) -> None:
         self._report(item, Phase.REFUSED, item.reason)
@@ -329,10 +335,17 @@ class TrackerWorker:
         self._enabled = item.enabled
 
     def _track(self, item: _Step | _Start, work: Callable[[], TrackResult]) -> None:
-        """Let the tracker work on a frame; whatever it raises costs the target only."""
+        """
+        Let the tracker work on a frame.
+
+        What the tracker refuses leaves it as it was; anything else that it raises costs the
+        target, and only that.
+        """
         began = time.monotonic()
         try:
             result = work()
+        except LMSCOError as error:
+            self._report(item, Phase.REFUSED, str(error), seconds=time.monotonic() - began)
         except Exception as error:  # noqa: B902
             self._has_target = False
             self._report(item, Phase.FAILED, f'{type(error).__name__}: {error}',

@@ -48,23 +48,25 @@ def test_warm_target_is_followed(run):
         assert y + height / 2 == pytest.approx(40.5 + number, abs=2)
 
 
-def test_box_outside_the_image_is_reported(run):
+def test_refused_box_is_reported_and_costs_nothing(run):
     running = run(tracker_factory=make_tracker)
     running.start(5000, 5000, 20, 20)
     status = running.send(_image(running.graph, 0))
-    assert status.state == 'failed' and 'BoxError' in status.message
+    assert status.state == 'refused' and 'of its area in the image' in status.message
     assert not running.boxes
     running.start(30, 30, 20, 20)
-    assert running.send(_image(running.graph, 1)).state == 'tracking'
+    first = running.send(_image(running.graph, 1))
+    assert first.state == 'tracking'
+    running.start(5000, 5000, 20, 20)
+    states = [running.send(_image(running.graph, number)) for number in range(2, 5)]
+    assert states[-1].state == 'tracking' and states[-1].track_id == first.track_id
 
 
-def test_other_image_size_is_reported_and_the_next_start_tracks(run):
+def test_frame_of_another_size_is_refused_and_costs_nothing(run):
     running = run(tracker_factory=make_tracker)
     running.start(30, 30, 20, 20)
     running.send(_image(running.graph, 0))
     small = running.graph.image(80, shape=(60, 80), dtype=np.uint8)
     status = running.send(small)
-    assert status.state == 'failed' and '(60, 80)' in status.message
-    assert running.send(_image(running.graph, 1)).state == 'idle'
-    running.start(32, 31, 20, 20)
-    assert running.send(_image(running.graph, 2)).state == 'tracking'
+    assert status.state == 'refused' and '(60, 80)' in status.message
+    assert running.send(_image(running.graph, 1)).state == 'tracking'
