@@ -26,8 +26,10 @@ import yaml
 from lmsco_ros.core.errors import ConfigError
 from lmsco_ros.core.validation import build, check_choice, check_range
 
-__all__ = ['ChannelConfig', 'ConfidenceConfig', 'FeatureConfig', 'IntensityConfig', 'LearningConfig',
-           'RuntimeConfig', 'SamplingConfig', 'ScaleConfig', 'TrackerConfig']
+__all__ = [
+    'ChannelConfig', 'ConfidenceConfig', 'FeatureConfig', 'IntensityConfig', 'LearningConfig',
+    'RuntimeConfig', 'SamplingConfig', 'ScaleConfig', 'TrackerConfig',
+]
 
 
 @dataclass(frozen=True)

@@ -90,7 +90,8 @@ class Outcome:
     frame : Frame
     phase : Phase
         TRACKED (there is a result), IDLE (no target), DISABLED, REFUSED (a request or a
-        frame could not be used; nothing changed) or FAILED (the tracker raised; the target is dropped).
+        frame could not be used; nothing changed) or FAILED (the tracker raised; the target is
+        dropped).
     result : TrackResult or None
         Only when TRACKED.
     track_id : int
