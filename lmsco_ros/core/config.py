@@ -18,6 +18,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
+import math
 from pathlib import Path
 from typing import Any
 
@@ -30,6 +31,9 @@ __all__ = [
     'ChannelConfig', 'ConfidenceConfig', 'FeatureConfig', 'IntensityConfig', 'LearningConfig',
     'RuntimeConfig', 'SamplingConfig', 'ScaleConfig', 'TrackerConfig',
 ]
+
+_FEWEST_CELLS = 5
+_LARGEST_SCALE = 4.0
 
 
 @dataclass(frozen=True)
@@ -71,7 +75,8 @@ class SamplingConfig:
     search_factor : float
         Side of the square search region over sqrt(target width * height).
     patch_size_min, patch_size_max : int
-        Limits of the side of the patch, in pixels; the search region is resampled into them.
+        Limits of the side of the patch, in pixels, into which the search region is resampled;
+        the nearest size that fits the cells and the Fourier transform is taken.
 
     """
 
@@ -249,6 +254,10 @@ class ScaleConfig:
         check_range(self, 'padding', 1, 4)
         check_range(self, 'regularization', 0, 100, open_low=True)
         check_range(self, 'label_sigma', 0, 50, open_low=True)
+        reach = self.step**max(self.exponent_max, -self.exponent_min)
+        if reach > _LARGEST_SCALE:
+            raise ConfigError(f'ScaleConfig.step and its exponents reach a factor of {reach:g} '
+                              f'from one frame to the next; expected at most {_LARGEST_SCALE:g}')
 
 
 @dataclass(frozen=True)
@@ -352,6 +361,16 @@ class TrackerConfig:
         if not self.features:
             raise ConfigError('TrackerConfig.features is empty; name at least one block, '
                               'for instance {channels: [{kind: hog}]}')
+        if _FEWEST_CELLS * self.cell > self.sampling.patch_size_max:
+            raise ConfigError(f'a patch of {self.sampling.patch_size_max} pixels has less than '
+                              f'{_FEWEST_CELLS} cells of {self.cell} pixels, the least common '
+                              'multiple of the cells in TrackerConfig.features; expected smaller '
+                              'cells or a larger SamplingConfig.patch_size_max')
+
+    @property
+    def cell(self) -> int:
+        """Pixels that every block's cell divides; the side of a patch is a multiple of it."""
+        return math.lcm(*(block.cell for block in self.features))
 
     @classmethod
     def preset(cls, name: str) -> TrackerConfig:

@@ -109,8 +109,7 @@ class Track:
         self._tile = 0
         self._gain = AutomaticGain(config.intensity)
         self._monitor = ConfidenceMonitor(config.confidence)
-        self._patch_size = patch_size(box.size, config.sampling,
-                                      max(block.cell for block in config.features))
+        self._patch_size = patch_size(box.size, config.sampling, config.cell)
         self._extractor = FeatureExtractor(config.features, self._patch_size, backend)
         view = FrameView(image, self._gain.observe(image))
         self._operator = self._learn_first(view, backend)
@@ -169,21 +168,24 @@ class Track:
                          sharpness)
 
     def _search_elsewhere(self, view: FrameView, here: Detection) -> Detection:
-        """Return the sharpest convincing detection in the next tiles of the image, or `here`."""
+        """Return a convincing detection in the next tiles of the image, or `here`."""
         settings = self._config.confidence
         tiles = search_tiles(view.size, here.region.width, self._box.center)
         chosen = [tiles[(self._tile + i) % len(tiles)]
                   for i in range(min(settings.tiles, len(tiles)))]
         self._tile += len(chosen)
-        found = [self._detect(view, BoundingBox.from_center(center, self._box.size))
-                 for center in chosen]
-        found = [d for d in found if self._monitor.quality(d.sharpness) >= settings.found]
-        return max(found, key=lambda d: d.sharpness, default=here)
+        if not chosen:
+            return here
+        best = max((self._detect(view, self._box.moved_to(center)) for center in chosen),
+                   key=lambda detection: detection.sharpness)
+        # The window of a tile dims what lies off its center: look again from there.
+        best = self._detect(view, self._box.moved_to(best.center))
+        return best if self._monitor.quality(best.sharpness) >= settings.found else here
 
     def _follow(self, view: FrameView, detection: Detection) -> None:
         """Move the box to the detection and adapt its size."""
         self._tile = 0
-        moved = BoundingBox.from_center(detection.center, self._box.size).scaled(detection.scale)
+        moved = self._box.moved_to(detection.center).scaled(detection.scale)
         moved = clamp_box(moved, view.size)
         factor = self._scale.estimate(view, moved)
         self._box = clamp_box(moved.scaled(factor), view.size)

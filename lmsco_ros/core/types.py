@@ -82,6 +82,10 @@ class BoundingBox:
         """Return (x, y, width, height)."""
         return self.x, self.y, self.width, self.height
 
+    def moved_to(self, center: tuple[float, float]) -> 'BoundingBox':
+        """Return the box around another center (x, y)."""
+        return BoundingBox.from_center(center, self.size)
+
     def scaled(self, factor: float) -> 'BoundingBox':
         """Return the box enlarged by `factor` around its center."""
         return BoundingBox.from_center(self.center, (factor * self.width, factor * self.height))
@@ -95,7 +99,7 @@ class BoundingBox:
     def overlap(self, other: 'BoundingBox') -> float:
         """Return intersection over union with `other`, in [0, 1]."""
         common = self.intersection(other)
-        return common / (self.area + other.area - common)
+        return min(1.0, common / (self.area + other.area - common))
 
 
 class TrackState(Enum):

@@ -33,7 +33,6 @@ from lmsco_ros.synthetic import SceneFrame
 from msg_adapters.image import image_from_message, message_from_image
 
 _NO_MAP = np.zeros((1, 1), np.float32)
-_WARM_UP_SECONDS = 0.5
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,15 +90,21 @@ def run_scene(frames: Sequence[SceneFrame], parameters: Mapping[str, object],
 
     with NodeSession(parameters, outputs=('confidence_map',)) as session:
         player = Player(session, keep_map)
-        began, origin = time.monotonic() + _WARM_UP_SECONDS, time.time_ns()
-        for frame in frames:
+        origin = time.time_ns()
+
+        def send(frame: SceneFrame) -> None:
             stamp = origin + frame.stamp_ns
-            message = message_from_image(frame.image, header=_header(stamp))
-            player.listen_until(began + frame.stamp_ns * 1e-9)
-            if frame.index == frames[0].index:
-                player.start(frame.box, stamp)
-            player.send(stamp, message)
+            player.send(stamp, message_from_image(frame.image, header=_header(stamp)))
             on_frame()
+
+        # The scene stands still until the node has taken up the target.
+        player.start(frames[0].box, origin + frames[0].stamp_ns)
+        send(frames[0])
+        player.settle(allowed=0)
+        began = time.monotonic() - frames[0].stamp_ns * 1e-9
+        for frame in frames[1:]:
+            player.listen_until(began + frame.stamp_ns * 1e-9)
+            send(frame)
         player.finish()
     return _assemble(frames, player.exchanges(), maps)
 

@@ -43,7 +43,8 @@ configs = st.builds(
                        window_minimum=st.floats(1e-6, 1), window_edge=st.floats(1, 1e3),
                        memory_size=st.integers(1, 1000)),
     scale=st.builds(ScaleConfig, estimator=st.sampled_from(['filter', 'search', 'none']),
-                    step=st.floats(1.001, 2)),
+                    step=st.floats(1.001, 1.15), exponent_min=st.integers(-9, 0),
+                    exponent_max=st.integers(0, 9)),
     confidence=st.builds(ConfidenceConfig, lost=st.floats(0, 0.1),
                          uncertain=st.floats(0.1, 1), found=st.floats(0.1, 2)),
     runtime=st.builds(RuntimeConfig, device=st.sampled_from(['cpu', 'cuda', 'cuda:1']),
@@ -105,9 +106,9 @@ def test_empty_configuration_is_the_default(tmp_path):
 
 
 def test_whole_numbers_may_be_written_either_way():
-    config = TrackerConfig.from_dict({'learning': {'memory_size': 5.0}, 'scale': {'step': 2}})
+    config = TrackerConfig.from_dict({'learning': {'memory_size': 5.0}, 'scale': {'padding': 2}})
     assert config.learning.memory_size == 5 and isinstance(config.learning.memory_size, int)
-    assert config.scale.step == 2.0 and isinstance(config.scale.step, float)
+    assert config.scale.padding == 2.0 and isinstance(config.scale.padding, float)
 
 
 def test_given_mapping_is_left_alone():
@@ -202,6 +203,18 @@ def test_bounds_name_the_field_the_value_and_the_range(kind, name, low, high):
 ])
 def test_ranges_must_not_be_turned_round(values):
     with pytest.raises(ConfigError, match='expected a value in'):
+        TrackerConfig.from_dict(values)
+
+
+@pytest.mark.parametrize('values, words', [
+    ({'sampling': {'patch_size_min': 64, 'patch_size_max': 64},
+      'features': [{'channels': [{'kind': 'hog'}], 'cell': 16}]}, '64 pixels .* cells of 16'),
+    ({'features': [{'channels': [{'kind': 'hog'}], 'cell': cell} for cell in (7, 11)]},
+     'cells of 77 pixels'),
+    ({'scale': {'step': 2, 'exponent_max': 50}}, 'reach a factor of 1.1259e\\+15'),
+])
+def test_values_that_do_not_go_together_are_refused(values, words):
+    with pytest.raises(ConfigError, match=words):
         TrackerConfig.from_dict(values)
 
 

@@ -26,6 +26,8 @@ or samples. Sums over the whole spectrum are recovered with the weights of `half
 
 from __future__ import annotations
 
+from array_api_compat import device
+
 from lmsco_ros.core.backend import Array, array_namespace, irfft2, rfft2
 
 __all__ = ['analyze', 'bandwidth', 'crop', 'embed', 'grid_size', 'half_weights', 'inner',
@@ -87,7 +89,7 @@ def synthesize(series: Array, size: int) -> Array:
     xp = array_namespace(series)
     order = bandwidth(series)
     gap = xp.zeros((size - grid_size(order), *series.shape[1:]), dtype=series.dtype,
-                   device=series.device)
+                   device=device(series))
     spectrum = xp.concat([series[order:], gap, series[:order]], axis=0)
     values = irfft2(spectrum, size)
     values *= size**2
@@ -98,7 +100,7 @@ def half_weights(series: Array) -> Array:
     """Return, for each kx >= 0, how often its column stands in the whole spectrum (1 or 2)."""
     xp = array_namespace(series)
     real = xp.real(series[:1, :1]).dtype
-    weights = xp.full((series.shape[1],), 2.0, dtype=real, device=series.device)
+    weights = xp.full((series.shape[1],), 2.0, dtype=real, device=device(series))
     weights[0] = 1.0
     return weights
 
@@ -155,7 +157,7 @@ def _phase(series: Array, frequencies: range, displacement: float) -> Array:
     """Return exp(2 pi i k displacement) for each k."""
     xp = array_namespace(series)
     angle = xp.asarray([2 * xp.pi * k * displacement for k in frequencies], dtype=series.dtype,
-                       device=series.device)
+                       device=device(series))
     return xp.exp(1j * angle)
 
 
@@ -166,7 +168,7 @@ def embed(series: Array, order: int) -> Array:
         return series
     xp = array_namespace(series)
     result = xp.zeros((grid_size(order), order + 1, *series.shape[2:]), dtype=series.dtype,
-                      device=series.device)
+                      device=device(series))
     result[order - own:order + own + 1, :own + 1, ...] = series
     return result
 

@@ -128,7 +128,7 @@ class SampleMemory:
         self._storage = [xp.zeros((rows, columns, capacity, channels), dtype=backend.complex,
                                   device=backend.device) for rows, columns, channels in shapes]
         self.mean = [0 * block[:, :, 0, :] for block in self._storage]
-        self.energy = [xp.real(block) for block in self.mean]
+        self.energy = [0 * xp.real(block) for block in self.mean]
 
     def __len__(self) -> int:
         """Return the number of samples."""

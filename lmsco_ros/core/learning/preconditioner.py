@@ -89,7 +89,7 @@ class CoupledPreconditioner:
     def __init__(self, memory: SampleMemory, margin_weight: float, window_energy: float) -> None:
         self._inverses = [1 / (margin_weight * energy + window_energy)
                           for energy in memory.energy]
-        self._means = [+mean for mean in memory.mean]
+        self._means = [1 * mean for mean in memory.mean]
         for mean in self._means:
             mean[bandwidth(mean), 0, :] = 0
         power = sum(self._total(mean * inverse, array_namespace(mean).conj(mean))
