@@ -70,6 +70,7 @@ setup(
             'pytest>=8,<10',
             'pytest-timeout>=2.3,<3',
             'pytest-xdist>=3.5,<4',
+            'vot-trax==4.0.2',
         ],
     },
     zip_safe=False,
