@@ -180,8 +180,8 @@ class LearningConfig:
     core: float = 0.5
     margin_weight: float = 1.0
     label_sigma: float = 1 / 12
-    window_minimum: float = 0.03
-    window_edge: float = 0.05
+    window_minimum: float = 0.02
+    window_edge: float = 0.06
     window_sparsity: float = 0.05
     memory_size: int = 30
     learning_rate: float = 0.01

@@ -29,7 +29,7 @@ _TRUNCATION = 0.2
 _TEXTURE_GAIN = 0.2357
 
 
-def hog(patches: np.ndarray, cell: int, noise_energy: float = 1e-4) -> np.ndarray:
+def hog(patches: np.ndarray, cell: int, noise_energy: float = 0.3) -> np.ndarray:
     """
     Return the HOG channels of several patches.
 
