@@ -47,6 +47,9 @@ class ScaleEstimator(Protocol):
 
     search_factors: tuple[float, ...]
 
+    def found_factor(self, values: np.ndarray) -> float:
+        """Return the scale of the target, given the best score at each of `search_factors`."""
+
     def learn(self, view: FrameView, box: BoundingBox) -> None:
         """Learn what the target at `box` looks like at its neighboring scales."""
 
@@ -64,6 +67,10 @@ class FixedScale:
 
     search_factors: tuple[float, ...] = (1.0,)
 
+    def found_factor(self, values: np.ndarray) -> float:
+        """Return 1."""
+        return 1.0
+
     def learn(self, view: FrameView, box: BoundingBox) -> None:
         """Learn nothing."""
 
@@ -74,7 +81,7 @@ class FixedScale:
 
 class ScaleSearch(FixedScale):
     """
-    Search over scaled patches (paper, end of section III-B).
+    Search over scaled patches (paper, end of section III-B), refined between the scales.
 
     Parameters
     ----------
@@ -84,10 +91,15 @@ class ScaleSearch(FixedScale):
     """
 
     def __init__(self, config: ScaleConfig) -> None:
+        self._config = config
         self.search_factors = scale_factors(config)
 
+    def found_factor(self, values: np.ndarray) -> float:
+        """Return the scale at the maximum of the parabola through the best scores."""
+        return _best_factor(self._config, values)
 
-class ScaleFilter:
+
+class ScaleFilter(FixedScale):
     """
     One-dimensional correlation filter over scale (Danelljan et al., DSST, BMVC 2014).
 
@@ -103,8 +115,6 @@ class ScaleFilter:
         Target (width, height) in the first frame; fixes the shape of the model.
 
     """
-
-    search_factors: tuple[float, ...] = (1.0,)
 
     def __init__(self, config: ScaleConfig, size: tuple[float, float]) -> None:
         self._config = config
@@ -134,10 +144,7 @@ class ScaleFilter:
         spectrum = self._sample(view, box)
         response = np.mean(self._numerator * spectrum, axis=1)
         response /= self._denominator + np.float32(self._config.regularization)
-        values = scipy.fft.irfft(response, len(self._factors))
-        best = int(np.argmax(values))
-        exponent = self._config.exponent_min + best + _parabola_offset(values, best)
-        return float(self._config.step**exponent)
+        return _best_factor(self._config, scipy.fft.irfft(response, len(self._factors)))
 
     def _sample(self, view: FrameView, box: BoundingBox) -> np.ndarray:
         """Return the spectrum over scale of the features, shape (n // 2 + 1, d)."""
@@ -174,6 +181,12 @@ def _zoom(pixels: np.ndarray, part: float, size: tuple[int, int]) -> np.ndarray:
     inverse = np.array([[step[0], 0, start[0]], [0, step[1], start[1]]])
     return cv2.warpAffine(pixels, inverse, size, flags=cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP,
                           borderMode=cv2.BORDER_REPLICATE)
+
+
+def _best_factor(config: ScaleConfig, values: np.ndarray) -> float:
+    """Return the factor at the maximum of `values`, one per scale, refined between the scales."""
+    best = int(np.argmax(values))
+    return float(config.step**(config.exponent_min + best + _parabola_offset(values, best)))
 
 
 def _parabola_offset(values: np.ndarray, best: int) -> float:

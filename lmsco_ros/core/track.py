@@ -47,7 +47,7 @@ class Detection:
     region : BoundingBox
         The region at the winning scale.
     scale : float
-        The winning scale, relative to the box that was searched for.
+        Size of the target, relative to the box that was searched for.
     peak : Peak
         Maximum of the score.
     sample : list of array, shape (2K_l + 1, K_l + 1, C_l)
@@ -164,8 +164,8 @@ class Track:
         best = peak.scale_index
         sharpness = peak_to_sidelobe_ratio(
             peak.grid, round(grid / (2 * self._config.sampling.search_factor)))
-        return Detection(regions[best], self._scale.search_factors[best], peak, samples[best],
-                         sharpness)
+        return Detection(regions[best], self._scale.found_factor(peak.scale_values), peak,
+                         samples[best], sharpness)
 
     def _search_elsewhere(self, view: FrameView, here: Detection) -> Detection:
         """Return a convincing detection in the next tiles of the image, or `here`."""

@@ -93,13 +93,14 @@ def test_position_and_size_are_recovered(make_scene, panning, growth):
     assert all(result.state is TrackState.TRACKING for result in results)
 
 
-@pytest.mark.parametrize('panning, growth', [(False, 1.006), (True, 0.994)])
-def test_search_over_scaled_patches_recovers_them_within_two_steps(make_scene, panning, growth):
-    # The best scale is not refined between the steps of 1 %.
+@pytest.mark.parametrize('panning, growth, bound', [
+    (True, 1.006, 0.01), (True, 0.994, 0.01), (False, 1.006, 0.03)])
+def test_search_over_scaled_patches_recovers_them(make_scene, panning, growth, bound):
+    # Four fifths of a scaled patch are background: one that does not scale holds the size back.
     errors, _ = follow(make_scene(), SEARCH, 16, growth, panning)
     position, size = report(errors)
     assert position.mean() < 0.1
-    assert size.mean() < 0.02
+    assert size.mean() < bound
 
 
 @pytest.mark.parametrize('name, convert', [

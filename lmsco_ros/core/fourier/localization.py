@@ -21,7 +21,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from lmsco_ros.core.backend import Array, to_numpy
-from lmsco_ros.core.fourier.series import bandwidth, half_weights, synthesize
+from lmsco_ros.core.fourier.series import bandwidth, grid_size, half_weights, synthesize
 
 __all__ = ['Peak', 'centered_map', 'locate', 'refine']
 
@@ -41,6 +41,8 @@ class Peak:
         Score at the maximum.
     grid : ndarray, shape (n, n)
         Scores of that scale on the grid; the origin is at [0, 0].
+    scale_values : ndarray, shape (n_scales,)
+        Highest score of each scale on the grid.
 
     """
 
@@ -48,6 +50,7 @@ class Peak:
     scale_index: int
     value: float
     grid: np.ndarray
+    scale_values: np.ndarray
 
 
 def locate(scores: Array, grid_points: int, newton_steps: int) -> Peak:
@@ -69,7 +72,7 @@ def locate(scores: Array, grid_points: int, newton_steps: int) -> Peak:
     start = (float(row) / grid_points, float(column) / grid_points)
     displacement, value = refine(to_numpy(scores[..., int(scale)]), start, newton_steps)
     wrapped = (_wrap(displacement[0]), _wrap(displacement[1]))
-    return Peak(wrapped, int(scale), value, grids[..., scale])
+    return Peak(wrapped, int(scale), value, grids[..., scale], grids.max(axis=(0, 1)))
 
 
 def _wrap(t: float) -> float:
@@ -89,7 +92,8 @@ def refine(series: np.ndarray, start: tuple[float, float],
     start : tuple of float
         (ty, tx) in periods.
     steps : int
-        Newton steps; a step that leaves the concave neighborhood ends the climb.
+        Newton steps, each at most half a point of the grid that carries the series. Where the
+        function is not concave, its curvature counts as if it were.
 
     Returns
     -------
@@ -104,14 +108,18 @@ def refine(series: np.ndarray, start: tuple[float, float],
     position = start
     first = _value(weighted, ky, kx, start)
     for _ in range(steps):
-        gradient, hessian = _derivatives(weighted, ky, kx, position)
-        determinant = hessian[0, 0] * hessian[1, 1] - hessian[0, 1]**2
-        if determinant <= 0 or hessian[0, 0] >= 0:
-            break
-        step = np.linalg.solve(hessian, gradient)
-        position = (position[0] - float(step[0]), position[1] - float(step[1]))
+        step = _ascent(*_derivatives(weighted, ky, kx, position))
+        step *= min(1.0, 0.5 / (grid_size(order) * max(float(np.hypot(*step)), 1e-12)))
+        position = (position[0] + float(step[0]), position[1] + float(step[1]))
     value = _value(weighted, ky, kx, position)
     return (position, value) if value >= first else (start, first)
+
+
+def _ascent(gradient: np.ndarray, hessian: np.ndarray) -> np.ndarray:
+    """Return the Newton step uphill: gradient over the absolute curvatures."""
+    curvatures, directions = np.linalg.eigh(hessian)
+    bounded = np.maximum(np.abs(curvatures), 1e-12 * np.abs(curvatures).max() + 1e-300)
+    return directions @ ((directions.T @ gradient) / bounded)
 
 
 def _value(weighted: np.ndarray, ky: np.ndarray, kx: np.ndarray,
