@@ -14,8 +14,10 @@
 
 """What the README promises is there: interface, parameters, commands, links and examples."""
 
+import importlib.util
 from pathlib import Path
 import re
+import time
 
 import cv2
 import numpy as np
@@ -25,6 +27,7 @@ import yaml
 REPOSITORY = Path(__file__).resolve().parents[2]
 README = (REPOSITORY / 'README.md').read_text()
 PICTURE_BYTES = 300_000
+PATIENCE_SECONDS = 20.0
 
 
 def table(heading):
@@ -48,12 +51,12 @@ def test_parameter_table_is_the_parameter_file():
 
 @pytest.fixture(scope='module')
 def node():
-    """Run the real node in a context of its own."""
+    """Run the real node in a context, and under a name, of its own."""
     rclpy = pytest.importorskip('rclpy', reason='needs ROS 2')
     from lmsco_ros.node.tracker_node import TrackerNode
     context = rclpy.Context()
     rclpy.init(context=context)
-    node = TrackerNode(context=context)
+    node = TrackerNode(context=context, namespace='described')
     yield node
     node.destroy_node()
     rclpy.shutdown(context=context)
@@ -64,29 +67,35 @@ def documented_names(node, rows):
     return {node.resolve_topic_name(row[0]): row[-2] for row in rows}
 
 
-def test_topic_table_is_the_interface_of_the_node(node):
+def offered_names(query, node, expected):
+    """Return {full name: type} that the graph tells of the node, once it tells of `expected`."""
+    deadline = time.monotonic() + PATIENCE_SECONDS
+    while True:
+        told = {name: types[0] for name, types in query(node.get_name(), node.get_namespace())}
+        if expected.items() <= told.items() or time.monotonic() > deadline:
+            return told
+        time.sleep(0.05)
+
+
+@pytest.mark.parametrize('direction', ['in', 'out'])
+def test_topic_table_is_the_interface_of_the_node(node, direction):
     """Every documented topic is offered with its type, and none is left out."""
-    own = (node.get_name(), node.get_namespace())
-    everybodys = {'/parameter_events', '/rosout', '/clock',
-                  f'/{node.get_name()}/transition_event'}
-    for direction, offered in [
-            ('in', node.get_subscriber_names_and_types_by_node(*own)),
-            ('out', node.get_publisher_names_and_types_by_node(*own))]:
-        offered = {name: types[0] for name, types in offered if name not in everybodys}
-        documented = documented_names(
-            node, [row for row in table('Topics') if row[1] == direction])
-        try:
-            import vision_msgs  # noqa: F401
-        except ImportError:
-            documented.pop('/lmsco_tracker/detections', None)
-        assert documented == offered
+    documented = documented_names(node, [row for row in table('Topics') if row[1] == direction])
+    if importlib.util.find_spec('vision_msgs') is None:
+        documented.pop(node.resolve_topic_name('~/detections'), None)
+    query = (node.get_subscriber_names_and_types_by_node if direction == 'in'
+             else node.get_publisher_names_and_types_by_node)
+    offered = offered_names(query, node, documented)
+    for everybodys in ('/parameter_events', '/rosout', '/clock', '~/transition_event'):
+        offered.pop(node.resolve_topic_name(everybodys), None)
+    assert documented == offered
 
 
 def test_service_table_is_offered_by_the_node(node):
     """Both services exist with the documented types."""
-    offered = node.get_service_names_and_types_by_node(node.get_name(), node.get_namespace())
     documented = documented_names(node, table('Services'))
-    assert documented.items() <= {name: types[0] for name, types in offered}.items()
+    offered = offered_names(node.get_service_names_and_types_by_node, node, documented)
+    assert documented.items() <= offered.items()
 
 
 def test_python_example_runs(tmp_path, monkeypatch, capsys):
