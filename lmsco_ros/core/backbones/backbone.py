@@ -1,0 +1,106 @@
+# Copyright 2026 lmsco_ros contributors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""What every network has in common: named layers on regular grids of cells."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import ClassVar
+
+import torch
+
+from lmsco_ros.core.errors import ConfigError
+
+__all__ = ['Backbone', 'Layer']
+
+
+@dataclass(frozen=True)
+class Layer:
+    """
+    An output that features can be taken from.
+
+    Attributes
+    ----------
+    stride : int
+        Side of a cell in pixels of the input.
+    channels : int
+        Number of channels.
+
+    """
+
+    stride: int
+    channels: int
+
+
+class Backbone(torch.nn.Module):
+    """
+    A network whose layers are maps of square cells.
+
+    Attributes
+    ----------
+    input_channels : int
+        Channels that `forward` takes: 1 for intensities in the working range, 3 for flow images
+        (u, v, magnitude) of 0..255.
+    layers : mapping of str to Layer
+        The outputs, from the first to the deepest.
+    aliases : mapping of str to str
+        The layers that a configuration for any network may call `shallow` and `deep`.
+    margin : int
+        Pixels by which the input is extended on every side, so that the middle S / stride cells
+        of every layer cover the middle S pixels.
+
+    """
+
+    input_channels: ClassVar[int] = 1
+    layers: ClassVar[Mapping[str, Layer]] = {}
+    aliases: ClassVar[Mapping[str, str]] = {}
+    margin: ClassVar[int] = 0
+
+    @classmethod
+    def layer_name(cls, name: str) -> str:
+        """
+        Return the layer that `name`, possibly an alias, stands for.
+
+        Raises
+        ------
+        ConfigError
+            When the network has no such layer; names those that it has.
+
+        """
+        resolved = cls.aliases.get(name, name)
+        if resolved not in cls.layers:
+            raise ConfigError(f'{cls.__name__} has no layer {name!r}; expected one of '
+                              f'{", ".join((*cls.aliases, *cls.layers))}')
+        return resolved
+
+    def forward(self, images: torch.Tensor, layers: Sequence[str]) -> list[torch.Tensor]:
+        """
+        Return the named layers, computing nothing beyond the deepest of them.
+
+        Parameters
+        ----------
+        images : tensor, shape (n, input_channels, H, W), float32
+            Input, extended by `margin`.
+        layers : sequence of str
+            Keys of `layers`.
+
+        Returns
+        -------
+        list of tensor, shape (n, C_l, H_l, W_l)
+            One for each name, in the order asked for.
+
+        """
+        raise NotImplementedError
