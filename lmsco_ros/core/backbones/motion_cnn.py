@@ -58,8 +58,8 @@ class MotionCNN(ImageNetwork):
         self.conv3 = Conv2d(384, 512, 3, padding=1)
         self.conv4 = Conv2d(512, 512, 3, padding=1, groups=2)
         self.conv5 = Conv2d(512, 384, 3, padding=1, groups=2)
-        self.norm1 = LocalResponseNorm(96, k=1.0, alpha=2e-5)
-        self.norm2 = LocalResponseNorm(384, k=1.0, alpha=2e-5)
+        self.norm1 = LocalResponseNorm(k=1.0, alpha=2e-5)
+        self.norm2 = LocalResponseNorm(k=1.0, alpha=2e-5)
         relu = ReLU(inplace=True)
         self.stages = {
             'conv1': (self.conv1, relu, pool(), self.norm1),

@@ -51,8 +51,8 @@ class VGGM(ImageNetwork):
         self.conv3 = Conv2d(256, 512, 3, padding=1)
         self.conv4 = Conv2d(512, 512, 3, padding=1)
         self.conv5 = Conv2d(512, 512, 3, padding=1)
-        self.norm1 = LocalResponseNorm(96, k=2.0, alpha=1e-4)
-        self.norm2 = LocalResponseNorm(256, k=2.0, alpha=1e-4)
+        self.norm1 = LocalResponseNorm(k=2.0, alpha=1e-4)
+        self.norm2 = LocalResponseNorm(k=2.0, alpha=1e-4)
         relu = ReLU(inplace=True)
         self.stages = {
             'conv1': (self.conv1, relu, self.norm1),
