@@ -93,6 +93,14 @@ def test_no_two_challenges_share_a_fingerprint():
     assert len(prints | {sequence().fingerprint}) == len(CHALLENGES) + 1
 
 
+def test_a_fingerprint_knows_the_truth_that_is_hidden():
+    made, other = sequence(), sequence()
+    other.ground_truth[75] += 1
+    one, two = (apply_challenge(item, 'disappear_1s') for item in (made, other))
+    assert np.array_equal(one.ground_truth, two.ground_truth, equal_nan=True)
+    assert one.fingerprint != two.fingerprint
+
+
 @pytest.mark.parametrize(('dtype', 'channels'), [
     (np.uint8, 3), (np.uint16, 1), (np.float32, 1)])
 def test_every_depth_is_taken_and_stays(name, dtype, channels):

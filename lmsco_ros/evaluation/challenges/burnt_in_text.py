@@ -70,6 +70,6 @@ def text(sequence: TrackingSequence) -> TrackingSequence:
     """Draw a running clock, a reticle, and a word that blinks at the target's mean place."""
     centers = sequence.ground_truth[:, :2] + sequence.ground_truth[:, 2:] / 2
     x, y = np.nanmean(centers, axis=0).astype(int).tolist()
-    frames = ChangedFrames(sequence.frames, range(len(sequence)),
+    frames = ChangedFrames(sequence, range(len(sequence)),
                            _Text(Span.of(sequence), (x, y)), 'text')
     return replace(sequence, frames=frames)

@@ -25,7 +25,6 @@ import numpy as np
 import numpy.typing as npt
 
 from lmsco_ros.evaluation.datasets import TrackingSequence
-from lmsco_ros.evaluation.datasets.frames import FrameSource
 from lmsco_ros.evaluation.trackers.code_version import sources_digest
 
 FRAMES_PER_SECOND = 30
@@ -49,14 +48,14 @@ class Unchanged:
 
 class ChangedFrames:
     """
-    Frames of another source, in an order of their own and each of them changed.
+    Frames of a sequence, in an order of their own and each of them changed.
 
     Parameters
     ----------
-    source : FrameSource
+    sequence : TrackingSequence
         Where the images come from.
     order : sequence of int
-        For each frame, the index of its image in the source.
+        For each frame, the index of its image in the sequence.
     change : Change
         What is done to each image.
     label : str
@@ -64,10 +63,10 @@ class ChangedFrames:
 
     """
 
-    def __init__(self, source: FrameSource, order: Sequence[int], change: Change,
+    def __init__(self, sequence: TrackingSequence, order: Sequence[int], change: Change,
                  label: str) -> None:
         """Keep the recipe; nothing is decoded yet."""
-        self._source = source
+        self._sequence = sequence
         self._order = tuple(int(index) for index in order)
         self._change = change
         self._label = label
@@ -75,10 +74,10 @@ class ChangedFrames:
 
     @property
     def signature(self) -> str:
-        """Signature of the source, the challenge and the version of its code."""
+        """Fingerprint of the sequence, with the challenge and the version of its code."""
         sources = tuple(sorted(Path(__file__).parent.glob('*.py')))
         order = zlib.crc32(repr(self._order).encode())
-        return f'{self._source.signature}|{self._label}|{order}|{sources_digest(sources)}'
+        return f'{self._sequence.fingerprint}|{self._label}|{order}|{sources_digest(sources)}'
 
     def __len__(self) -> int:
         """Return the number of frames."""
@@ -97,7 +96,7 @@ class ChangedFrames:
     def _image(self, index: int) -> npt.NDArray:
         """Return an image; a video would start again to show the same one twice."""
         if self._held is None or self._held[0] != index:
-            self._held = index, self._source[index]
+            self._held = index, self._sequence.frames[index]
         return self._held[1]
 
 

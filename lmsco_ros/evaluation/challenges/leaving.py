@@ -76,7 +76,7 @@ def leave(sequence: TrackingSequence) -> TrackingSequence:
     away[:, axis] = room[axis] if far else 0
     corners = np.rint((1 - turned) * follow + turned * away).astype(int)
     truth = _seen(sequence.ground_truth - np.pad(corners, ((0, 0), (0, 2))), size)
-    frames = ChangedFrames(sequence.frames, range(len(sequence)),
+    frames = ChangedFrames(sequence, range(len(sequence)),
                            _Window(corners, (int(size[0]), int(size[1]))), 'leave')
     return replace(sequence, frames=frames, ground_truth=truth)
 

@@ -62,7 +62,7 @@ def disappear(sequence: TrackingSequence, seconds: float) -> TrackingSequence:
     truth = sequence.ground_truth.copy()
     truth[start:start + duration] = np.nan
     erase = _Erase(sequence.ground_truth, start, start + duration, seed_of(sequence))
-    frames = ChangedFrames(sequence.frames, range(len(sequence)), erase, f'disappear {seconds}')
+    frames = ChangedFrames(sequence, range(len(sequence)), erase, f'disappear {seconds}')
     return replace(sequence, frames=frames, ground_truth=truth)
 
 
@@ -85,7 +85,7 @@ def cut(sequence: TrackingSequence) -> TrackingSequence:
     end = int(ends[np.nanargmax(distances)])
     kept = np.r_[:start, end:len(sequence)]
     attributes = {name: flags[kept] for name, flags in sequence.attributes.items()}
-    frames = ChangedFrames(sequence.frames, kept, Unchanged(), 'cut')
+    frames = ChangedFrames(sequence, kept, Unchanged(), 'cut')
     return replace(sequence, frames=frames, ground_truth=truth[kept], attributes=attributes)
 
 
@@ -122,7 +122,7 @@ def twin(sequence: TrackingSequence) -> TrackingSequence:
     distance *= max(width, np.sqrt(width * height))
     offsets = distance[:, None] * np.stack([side * np.cos(angle), np.sin(angle)], axis=1)
     return replace(sequence, frames=ChangedFrames(
-        sequence.frames, frames, _Twin(sequence.ground_truth, offsets), 'twin'))
+        sequence, frames, _Twin(sequence.ground_truth, offsets), 'twin'))
 
 
 def _middle(sequence: TrackingSequence, duration: int) -> int:

@@ -49,7 +49,7 @@ def shutter(sequence: TrackingSequence) -> TrackingSequence:
     order = np.where(closed, frames - since, frames)
     attributes = {name: flags[order] for name, flags in sequence.attributes.items()}
     return replace(sequence, ground_truth=sequence.ground_truth[order], attributes=attributes,
-                   frames=ChangedFrames(sequence.frames, order, Unchanged(), 'shutter'))
+                   frames=ChangedFrames(sequence, order, Unchanged(), 'shutter'))
 
 
 @dataclass(frozen=True)
@@ -183,7 +183,7 @@ def sixteen_bit(sequence: TrackingSequence) -> TrackingSequence:
 
 
 def _changed(sequence: TrackingSequence, change: Change, label: str) -> TrackingSequence:
-    frames = ChangedFrames(sequence.frames, range(len(sequence)), change, label)
+    frames = ChangedFrames(sequence, range(len(sequence)), change, label)
     return replace(sequence, frames=frames)
 
 
