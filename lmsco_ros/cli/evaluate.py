@@ -73,9 +73,9 @@ def evaluate(
         show_default=False, help='Only this part of the fixed split of thermal_dev.')] = None,
     challenge: Annotated[Optional[list[str]], typer.Option(
         show_default='the sequences as they are',
-        help='Make the sequences harder: disappear_1s, disappear_3s, leave, cut, twin, shutter, '
-             'gain_jump, polarity, dead_pixels, telemetry, nan, text, sixteen_bit or all. '
-             'May be repeated.')] = None,
+        help='Make the sequences harder: disappear_1s, disappear_3s, leave, cut, twin, '
+             'twin_remains, shutter, gain_jump, polarity, dead_pixels, telemetry, nan, text, '
+             'sixteen_bit or all. May be repeated.')] = None,
 ) -> None:
     """Run trackers over a dataset and report accuracy, robustness and speed."""
     from lmsco_ros.evaluation.challenges import challenge_names

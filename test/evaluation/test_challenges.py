@@ -174,6 +174,16 @@ def test_twin_is_a_second_target_that_never_covers_the_first():
     assert np.ptp(centers, axis=0).min() > 5 and steps.max() < 8
 
 
+def test_the_twin_remains_where_the_target_disappears():
+    made, both = (apply_challenge(sequence(), which) for which in ('twin_remains', 'twin'))
+    for index in (30, 60, 75, 89, 120):
+        image, absent = made.frames[index], is_absent(made.ground_truth[[index]])[0]
+        assert absent == (60 <= index < 90)
+        count, _ = cv2.connectedComponents((image > 180).astype(np.uint8))
+        assert count - 1 == (1 if absent else 2)
+        assert absent or np.array_equal(image, both.frames[index])
+
+
 def test_leaving_shows_the_target_where_the_truth_says_and_nowhere_else():
     made = apply_challenge(sequence(), 'leave')
     absent = is_absent(made.ground_truth)

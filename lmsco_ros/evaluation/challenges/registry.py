@@ -55,6 +55,8 @@ CHALLENGES: Mapping[str, Challenge] = {
     'leave': Challenge('the picture pans away from the target and back', leave),
     'cut': Challenge('frames are missing, so that the target jumps', cut),
     'twin': Challenge('a copy of the target moves beside it', twin),
+    'twin_remains': Challenge('beside a copy of itself, the target disappears for 30 frames',
+                              lambda sequence: disappear(twin(sequence), 1)),
     'shutter': Challenge('the picture stands for 12 frames every 60', shutter),
     'gain_jump': Challenge('gain and offset jump every 20 frames', gain_jump),
     'polarity': Challenge('white hot and black hot change places for a third of the time',
