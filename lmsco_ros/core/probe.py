@@ -20,7 +20,7 @@ import cv2
 import numpy as np
 
 __all__ = ['credible_values', 'is_frozen', 'percentiles', 'PolarityTracker', 'take_probe',
-           'to_gray']
+           'to_gray', 'without_dead_pixels']
 
 _PROBE_POINTS = 8192
 
@@ -114,6 +114,27 @@ def credible_values(image: np.ndarray, probe: np.ndarray, spread: float) -> np.n
     deviation = np.abs(repaired - repaired.mean(axis=1, keepdims=True)).mean(axis=1)
     noise = (roughness > _NOISE_RATIO * deviation) & (deviation > _NOISE_SPREAD * spread)
     return probe[finite & ~alone & ~noise[:, None]]
+
+
+def without_dead_pixels(pixels: np.ndarray, spread: float) -> np.ndarray:
+    """
+    Return a part of a frame with the dead pixels, alone or in lines, filled in.
+
+    A pixel is dead when it stands out from the median of its 3 x 3 neighborhood, which takes
+    its place. Edges and targets of three pixels and more stay as they are, but for corners.
+
+    Parameters
+    ----------
+    pixels : ndarray, shape (h, w)
+        Counts; those that are not finite stay as they are.
+    spread : float
+        Difference from the median, in counts, above which a pixel stands out.
+
+    """
+    values = _finite(pixels) if pixels.dtype == np.float32 else pixels
+    median = cv2.medianBlur(np.ascontiguousarray(values), 3)
+    dead = cv2.absdiff(values, median) > spread
+    return np.where(dead & np.isfinite(pixels), median, pixels) if dead.any() else pixels
 
 
 def is_frozen(previous: np.ndarray, probe: np.ndarray) -> bool:

@@ -23,7 +23,7 @@ from lmsco_ros.core.config import IntensityConfig
 from lmsco_ros.core.errors import ImageError
 from lmsco_ros.core.intensity import AutomaticGain, IntensityRange
 from lmsco_ros.core.probe import (
-    credible_values, is_frozen, percentiles, PolarityTracker, take_probe)
+    credible_values, is_frozen, percentiles, PolarityTracker, take_probe, without_dead_pixels)
 
 SHAPE = (120, 160)
 
@@ -177,6 +177,32 @@ def test_pixels_that_are_no_picture_do_not_stretch_the_range(rng, shape, damage,
     clean = AutomaticGain(IntensityConfig()).observe(image)
     broken = AutomaticGain(IntensityConfig()).observe(damage(image.copy(), rng))
     assert as_tuple(broken) == pytest.approx(as_tuple(clean), abs=30)
+
+
+@pytest.mark.parametrize('dtype', [np.uint8, np.uint16, np.float32])
+def test_dead_pixels_become_the_median_around_them(rng, dtype):
+    image = scene(low=20, span=150, shape=(40, 50)).astype(dtype)
+    image[rng.integers(0, 40, 20), rng.integers(0, 50, 20)] = 255
+    image[7], image[:, 31] = 0, 255
+    windows = np.lib.stride_tricks.sliding_window_view(np.pad(image, 1, 'edge'), (3, 3))
+    median = np.median(windows, axis=(2, 3)).astype(dtype)
+    far = np.abs(image.astype(float) - median) > 60
+    expected = np.where(far, median, image)
+    assert far.sum() > 80
+    np.testing.assert_array_equal(without_dead_pixels(image, 60), expected)
+
+
+def test_a_living_picture_stays_as_it_is():
+    image = scene(shape=(40, 50)).astype(np.float32)
+    image[10:13, 20:23] += 2000
+    image[5, 5], image[30, 30] = np.nan, np.inf
+    clean = without_dead_pixels(image, 600)
+    changed = (clean != image) & np.isfinite(image)
+    # The corners of a small target, no more.
+    assert changed.sum() <= 4
+    assert np.isnan(clean[5, 5]) and np.isinf(clean[30, 30])
+    view = image[::2, ::2]
+    assert without_dead_pixels(view, 1e6) is view
 
 
 def test_a_warm_region_is_a_picture():
