@@ -32,7 +32,8 @@ __all__ = ['Progress', 'download', 'file_sha256']
 
 Progress = Callable[[int, int | None], None]
 
-_CHUNK_BYTES = 1 << 17
+# What a broken connection has brought of a chunk is lost.
+_CHUNK_BYTES = 1 << 16
 _TIMEOUT_SECONDS = (10.0, 60.0)
 _FRUITLESS_TRIES = 3
 
@@ -74,14 +75,14 @@ def download(url: str, path: Path, sha256: str | None = None,
         retry = Retry(connect=2, read=0, redirect=5, other=0, backoff_factor=0.3)
         for scheme in ('http://', 'https://'):
             session.mount(scheme, HTTPAdapter(max_retries=retry))
-        fruitless = 0
+        most, fruitless = partial.size, 0
         while True:
-            before = partial.size
             try:
                 _receive(session, url, partial, progress)
                 break
             except requests.RequestException as error:
-                fruitless = 0 if partial.size > before else fruitless + 1
+                fruitless = 0 if partial.size > most else fruitless + 1
+                most = max(most, partial.size)
                 if fruitless == _FRUITLESS_TRIES:
                     raise WeightsError(f'{url} could not be downloaded ({error}); try again '
                                        'later, what has arrived is kept') from error

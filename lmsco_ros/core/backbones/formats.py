@@ -21,8 +21,6 @@ import hashlib
 import os
 from pathlib import Path
 import pickle
-import zipfile
-import zlib
 
 import numpy as np
 from safetensors import safe_open, SafetensorError
@@ -77,10 +75,12 @@ def write_arrays(path: Path, arrays: Mapping[str, np.ndarray],
         What `read_about` will tell.
 
     """
+    # The library writes the memory of an array, whatever its strides.
+    arrays = {name: np.ascontiguousarray(array) for name, array in arrays.items()}
     path.parent.mkdir(parents=True, exist_ok=True)
     partial = path.with_name(f'{path.name}.{os.getpid()}.part')
     try:
-        save_file(dict(arrays), partial, {**about, _DIGEST: _digest(arrays)})
+        save_file(arrays, partial, {**about, _DIGEST: _digest(arrays)})
         os.replace(partial, path)
     finally:
         partial.unlink(missing_ok=True)
@@ -101,7 +101,7 @@ def _digest(arrays: Mapping[str, np.ndarray]) -> str:
     """Return a checksum of the names, types, shapes and values of arrays."""
     digest = hashlib.sha256()
     for name in sorted(arrays):
-        array = np.ascontiguousarray(arrays[name])
+        array = arrays[name]
         digest.update(f'{name} {array.dtype.str} {array.shape}\n'.encode())
         digest.update(array.data)
     return digest.hexdigest()
@@ -126,23 +126,25 @@ def _read_safetensors(path: Path) -> Arrays:
 
 def _read_npz(path: Path) -> Arrays:
     """Return the arrays of a NumPy archive; objects in it are refused."""
-    try:
-        with np.load(path, allow_pickle=False) as archive:
-            return {name: archive[name] for name in archive.files}
-    except (ValueError, EOFError, AttributeError, TypeError, zipfile.BadZipFile,
-            zlib.error) as error:
-        raise _damaged(path, 'NumPy archive', error) from error
+    with path.open('rb') as file:
+        try:
+            with np.load(file, allow_pickle=False) as archive:
+                return {name: archive[name] for name in archive.files}
+        # The libraries raise whatever the damage of a file makes them stumble over.
+        except Exception as error:
+            raise _damaged(path, 'NumPy archive', error) from error
 
 
 def _read_torch(path: Path) -> Arrays:
     """Return the tensors of a state dictionary, alone or as `state_dict` of a checkpoint."""
-    try:
-        content = torch.load(path, map_location='cpu', weights_only=True)
-    except pickle.UnpicklingError as error:
-        raise WeightsError(f'{path} holds more than tensors, or is damaged; expected a state '
-                           'dictionary; save network.state_dict() alone') from error
-    except (RuntimeError, EOFError, ValueError, KeyError, zipfile.BadZipFile) as error:
-        raise _damaged(path, 'PyTorch', error) from error
+    with path.open('rb') as file:
+        try:
+            content = torch.load(file, map_location='cpu', weights_only=True)
+        except pickle.UnpicklingError as error:
+            raise WeightsError(f'{path} holds more than tensors, or is damaged; expected a state '
+                               'dictionary; save network.state_dict() alone') from error
+        except Exception as error:
+            raise _damaged(path, 'PyTorch', error) from error
     if isinstance(content, Mapping):
         content = content.get('state_dict', content)
     if not isinstance(content, Mapping):

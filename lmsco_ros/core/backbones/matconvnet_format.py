@@ -17,12 +17,10 @@
 from __future__ import annotations
 
 from pathlib import Path
-import struct
-import zlib
+from typing import Any
 
 import numpy as np
 from scipy.io import loadmat
-from scipy.io.matlab import MatReadError
 
 from lmsco_ros.core.errors import WeightsError
 
@@ -42,29 +40,34 @@ def read_matconvnet(path: Path) -> dict[str, np.ndarray]:
         When the file is damaged, of MATLAB 7.3, or holds no layers.
 
     """
-    try:
-        content = loadmat(path)
-        network = content['net'][0, 0] if 'net' in content else content
-        if 'layers' not in _fields(network):
-            raise WeightsError(f'{path} has no variable `layers`; expected a network of '
-                               'MatConvNet (simplenn)')
-        arrays = {}
-        for layer in network['layers'].ravel():
-            arrays.update(_layer_arrays(layer[0, 0]))
-        mean = _mean(network)
-    except NotImplementedError as error:
-        raise WeightsError(f'{path} is a file of MATLAB 7.3 or newer; load it there and save it '
-                           'with the option -v7') from error
-    except (ValueError, TypeError, IndexError, KeyError, EOFError, OSError, MatReadError,
-            struct.error, zlib.error) as error:
-        if isinstance(error, (FileNotFoundError, PermissionError, WeightsError)):
+    with path.open('rb') as file:
+        try:
+            return _network_arrays(loadmat(file), path)
+        except NotImplementedError as error:
+            raise WeightsError(f'{path} is a file of MATLAB 7.3 or newer; load it there and save '
+                               'it with the option -v7') from error
+        except WeightsError:
             raise
-        raise WeightsError(f'{path} is damaged, or no MATLAB file with a network of MatConvNet '
-                           f'({error}); get it again') from error
+        # The library raises whatever the damage of a file makes it stumble over.
+        except Exception as error:
+            raise WeightsError(f'{path} is damaged, or no MATLAB file with a network of '
+                               f'MatConvNet ({error}); get it again') from error
+
+
+def _network_arrays(content: dict[str, Any], path: Path) -> dict[str, np.ndarray]:
+    """Return the arrays of the network among the variables of a file."""
+    network = content['net'][0, 0] if 'net' in content else content
+    if 'layers' not in _fields(network):
+        raise WeightsError(f'{path} has no variable `layers`; expected a network of MatConvNet '
+                           '(simplenn)')
+    arrays = {}
+    for layer in network['layers'].ravel():
+        arrays.update(_layer_arrays(layer[0, 0]))
+    mean = _mean(network)
     return arrays if mean is None else {**arrays, 'mean': mean}
 
 
-def _fields(value: object) -> tuple[str, ...]:
+def _fields(value: Any) -> tuple[str, ...]:
     """Return the names of the fields of a MATLAB structure, or of the variables of a file."""
     if isinstance(value, dict):
         return tuple(value)
@@ -89,10 +92,10 @@ def _layer_arrays(layer: np.void) -> dict[str, np.ndarray]:
     return {f'{name}.weight': kernels.transpose(3, 2, 0, 1), f'{name}.bias': bias.reshape(-1)}
 
 
-def _mean(network: object) -> np.ndarray | None:
+def _mean(network: Any) -> np.ndarray | None:
     """Return the mean of each channel that training subtracted, or None where it is not told."""
     fields = _fields(network)
-    holder = network['meta'][0, 0] if 'meta' in fields else network  # type: ignore[index]
+    holder = network['meta'][0, 0] if 'meta' in fields else network
     if 'normalization' not in _fields(holder):
         return None
     normalization = holder['normalization'][0, 0]
