@@ -48,7 +48,8 @@ def list_weights(directory: DirectoryOption = None) -> None:
     rows = []
     for source in WEIGHTS:
         path = locate(source, directory)
-        state = 'comes with the package' if source.bundled else path.name if path else 'missing'
+        state = ('missing' if path is None else
+                 'comes with the package' if source.bundled else path.name)
         rows.append((source.name, state, source.license, source.purpose))
     show_table(('name', 'here', 'license', 'purpose'), rows)
     say(f'folder: {weights_directory(directory)}')

@@ -94,8 +94,8 @@ def test_wrong_bytes_are_refused(lmsco, served, folder):
 
 @pytest.mark.parametrize('arguments, words', [
     (('verify', 'vgg_m_2048'), 'lmsco weights fetch vgg_m_2048'),
-    (('verify', 'nothing'), 'expected one of vgg_m_2048'),
-    (('fetch', 'nothing'), 'expected one of vgg_m_2048'),
+    (('verify', 'nothing'), 'there are no weights called'),
+    (('fetch', 'nothing'), 'there are no weights called'),
     (('fetch', 'motion_cnn'), 'no address'),
 ])
 def test_errors_tell_what_to_do(lmsco, arguments, words):
