@@ -26,7 +26,7 @@ import numpy as np
 
 from lmsco_ros.core.errors import WeightsError
 
-__all__ = ['network_message', 'read_caffemodel']
+__all__ = ['read_caffemodel']
 
 _PACKAGE = 'lmsco_ros.caffe'
 # Only what is needed to find arrays; all other fields are skipped as unknown. For each message:
@@ -44,27 +44,6 @@ _MESSAGES: dict[str, tuple[tuple[str, int, str, bool], ...]] = {
 }
 
 
-def network_message() -> type[Message]:
-    """Return the class of the outermost message of a file."""
-    file = FileDescriptorProto(name='lmsco_ros/caffe.proto', package=_PACKAGE, syntax='proto2')
-    for name, fields in _MESSAGES.items():
-        message = file.message_type.add(name=name)
-        for field, number, kind, repeated in fields:
-            _add_field(message.field.add(name=field, number=number), kind, repeated)
-    return GetMessages([file])[f'{_PACKAGE}.Network']
-
-
-def _add_field(field: FieldDescriptorProto, kind: str, repeated: bool) -> None:
-    """Fill in the type of a field."""
-    field.label = (FieldDescriptorProto.LABEL_REPEATED if repeated
-                   else FieldDescriptorProto.LABEL_OPTIONAL)
-    if kind in _MESSAGES:
-        field.type, field.type_name = FieldDescriptorProto.TYPE_MESSAGE, f'.{_PACKAGE}.{kind}'
-    else:
-        field.type = FieldDescriptorProto.Type.Value(f'TYPE_{kind.upper()}')
-        field.options.packed = repeated
-
-
 def read_caffemodel(path: Path) -> dict[str, np.ndarray]:
     """
     Return kernels (out, in / groups, kh, kw) and biases (out,) of all layers.
@@ -78,7 +57,7 @@ def read_caffemodel(path: Path) -> dict[str, np.ndarray]:
         When the file is damaged or holds no layer with arrays.
 
     """
-    network: Any = network_message()()
+    network: Any = _network_message()()
     try:
         network.ParseFromString(path.read_bytes())
     except DecodeError as error:
@@ -104,3 +83,24 @@ def _blob_array(blob: Any, path: Path, name: str) -> np.ndarray:
         raise WeightsError(f'{path}: array {name} has {numbers.size} numbers for the shape '
                            f'{shape}; the file is damaged, get it again')
     return numbers.reshape(shape)
+
+
+def _network_message() -> type[Message]:
+    """Return the class of the outermost message of a file."""
+    file = FileDescriptorProto(name='lmsco_ros/caffe.proto', package=_PACKAGE, syntax='proto2')
+    for name, fields in _MESSAGES.items():
+        message = file.message_type.add(name=name)
+        for field, number, kind, repeated in fields:
+            _add_field(message.field.add(name=field, number=number), kind, repeated)
+    return GetMessages([file])[f'{_PACKAGE}.Network']
+
+
+def _add_field(field: FieldDescriptorProto, kind: str, repeated: bool) -> None:
+    """Fill in the type of a field."""
+    field.label = (FieldDescriptorProto.LABEL_REPEATED if repeated
+                   else FieldDescriptorProto.LABEL_OPTIONAL)
+    if kind in _MESSAGES:
+        field.type, field.type_name = FieldDescriptorProto.TYPE_MESSAGE, f'.{_PACKAGE}.{kind}'
+    else:
+        field.type = FieldDescriptorProto.Type.Value(f'TYPE_{kind.upper()}')
+        field.options.packed = repeated

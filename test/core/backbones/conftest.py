@@ -21,7 +21,6 @@ import pytest
 from scipy.io import savemat
 import torch
 
-from lmsco_ros.core.backbones.caffe_format import network_message
 from lmsco_ros.core.backbones.formats import write_arrays
 
 
@@ -179,22 +178,43 @@ def write_matconvnet(path, arrays, modern):
     savemat(path, content)
 
 
+def varint(number):
+    """Return a number as the wire format of protocol buffers writes it."""
+    low, rest = number & 127, number >> 7
+    return bytes([low | 128]) + varint(rest) if rest else bytes([low])
+
+
+def field(number, value):
+    """Return a field of a message: a number, or the bytes of anything longer."""
+    if isinstance(value, int):
+        return varint(number << 3) + varint(value)
+    return varint(number << 3 | 2) + varint(len(value)) + value
+
+
+def caffe_blob(array, modern):
+    """Return an array with its shape, old or new, and a gradient that nobody needs."""
+    if modern:
+        shape = field(7, field(1, b''.join(map(varint, array.shape))))
+    else:
+        sizes = (1,) * (4 - array.ndim) + array.shape
+        shape = b''.join(field(number + 1, size) for number, size in enumerate(sizes))
+    return shape + field(5, array.astype('<f4').tobytes()) + field(6, bytes(8))
+
+
 def write_caffe(path, arrays, modern):
-    """Write a network of Caffe, with a layer without arrays."""
-    network = network_message()(name='net')
-    layers = network.layer if modern else network.layers
-    layers.add(name='data')
+    """
+    Write a network of Caffe, byte by byte, with a layer without arrays.
+
+    The numbers of the fields are those of its published definition: layers 100 with name 1,
+    type 2 and blobs 7; before, layers 2 with name 4, type 5 and blobs 6.
+    """
+    layer, name_field, type_field, blobs = (100, 1, 2, 7) if modern else (2, 4, 5, 6)
+    kind = b'Convolution' if modern else 4
+    content = field(1, b'net') + field(layer, field(name_field, b'data'))
     for name, pair in layers_of(arrays).items():
-        target = layers.add(name=name)
-        for array in pair:
-            blob = target.blobs.add()
-            blob.data.extend(array.ravel().tolist())
-            if modern:
-                blob.shape.dim.extend(array.shape)
-            else:
-                sizes = (1,) * (4 - array.ndim) + array.shape
-                blob.num, blob.channels, blob.height, blob.width = sizes
-    path.write_bytes(network.SerializeToString())
+        content += field(layer, field(name_field, name.encode()) + field(type_field, kind)
+                         + b''.join(field(blobs, caffe_blob(array, modern)) for array in pair))
+    path.write_bytes(content)
 
 
 def write_torch(path, arrays, nested):
