@@ -20,8 +20,9 @@ from pathlib import Path
 from typing import Any
 
 from google.protobuf.descriptor_pb2 import FieldDescriptorProto, FileDescriptorProto
+from google.protobuf.descriptor_pool import DescriptorPool
 from google.protobuf.message import DecodeError, Message
-from google.protobuf.message_factory import GetMessages
+from google.protobuf.message_factory import GetMessageClass
 import numpy as np
 
 from lmsco_ros.core.errors import WeightsError
@@ -92,7 +93,9 @@ def _network_message() -> type[Message]:
         message = file.message_type.add(name=name)
         for field, number, kind, repeated in fields:
             _add_field(message.field.add(name=field, number=number), kind, repeated)
-    return GetMessages([file])[f'{_PACKAGE}.Network']
+    pool = DescriptorPool()
+    pool.AddSerializedFile(file.SerializeToString())
+    return GetMessageClass(pool.FindMessageTypeByName(f'{_PACKAGE}.Network'))
 
 
 def _add_field(field: FieldDescriptorProto, kind: str, repeated: bool) -> None:
