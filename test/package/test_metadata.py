@@ -30,8 +30,8 @@ import pytest
 
 REPOSITORY = Path(__file__).resolve().parents[2]
 LIBRARIES = ('lmsco_ros', 'msg_adapters')
-# Installed from the package index where ROS 2 is: Ubuntu 24.04 has no package of them, or too old a
-# one (protobuf).
+# Installed from the package index where ROS 2 is: Ubuntu 24.04 has no package of them, or one that
+# is too old (protobuf).
 WITHOUT_ROSDEP_KEY = {
     'array-api-compat', 'protobuf', 'rosbags', 'safetensors', 'threadpoolctl', 'torch'}
 # The others are for evaluation against foreign code and stay out of the environment.
