@@ -45,29 +45,32 @@ class FakeTracker:
     """
     Moves its box one pixel to the right in every frame.
 
-    `states` overrides the state of coming updates, `error` is raised once, `gate` holds every
-    call until it is set, `calls` tells what happened on which image.
+    `states` overrides the state of coming updates, `error` is raised once, `inspect` may raise
+    whatever it thinks of an image, `gate` holds every call until it is set, `calls` tells what
+    happened on which image.
     """
 
     def __init__(self):
         self.states, self.error, self.calls = [], None, []
+        self.inspect = lambda image: None
         self.gate = threading.Event()
         self.gate.set()
 
     def initialize(self, image, box):
         self.calls.append(('initialize', image.copy()))
+        self._obey(image)
         self.box = box
-        self._obey()
         return self._result(image, TrackState.TRACKING)
 
     def update(self, image):
         self.calls.append(('update', image.copy()))
-        self._obey()
+        self._obey(image)
         self.box = BoundingBox(self.box.x + 1, *self.box.as_tuple()[1:])
         return self._result(image, self.states.pop(0) if self.states else TrackState.TRACKING)
 
-    def _obey(self):
+    def _obey(self, image):
         assert self.gate.wait(PATIENCE)
+        self.inspect(image)
         error, self.error = self.error, None
         if error is not None:
             raise error
@@ -160,6 +163,14 @@ def graph():
     graph.close()
 
 
+@pytest.fixture
+def other_graph():
+    """Return a second graph, of somebody else."""
+    graph = Graph()
+    yield graph
+    graph.close()
+
+
 class Running:
     """A running tracker node with its most used topics connected."""
 
@@ -185,8 +196,10 @@ class Running:
     def send(self, *images):
         """Publish images one by one, and wait for the answer to each."""
         for image in images or [self.graph.image()]:
+            before = len(self._status_messages)
             self.images.publish(image)
-            self.graph.spin_until(lambda: self._is_answered(image.header))
+            self.graph.spin_until(lambda: len(self._status_messages) > before
+                                  and self._is_answered(image.header))
         return self.statuses[-1]
 
     def _is_answered(self, header):
@@ -217,6 +230,12 @@ class Running:
     def last_box(self):
         """The newest box as x, y, width, height."""
         return box_from_polygon(self.boxes[-1])
+
+
+@pytest.fixture
+def make_fake():
+    """Return the maker of trackers that do as they are told."""
+    return FakeTracker
 
 
 @pytest.fixture
