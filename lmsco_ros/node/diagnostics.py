@@ -58,6 +58,7 @@ def frame_status(outcome: Outcome, dropped_frames: int, published: float, *,
     Parameters
     ----------
     outcome : Outcome
+        Of the frame.
     dropped_frames : int
         Of the worker.
     published : float

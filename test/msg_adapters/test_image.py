@@ -210,7 +210,8 @@ def test_other_files_and_pixels_are_refused():
 
 
 @pytest.mark.parametrize('declared', [
-    '', 'jpeg', '16UC1; png compressed', 'mono8; jpeg compressed bgr8', 'tiff', '\u2603', 'x' * 5000])
+    '', 'jpeg', '16UC1; png compressed', 'mono8; jpeg compressed bgr8', 'tiff', '\u2603',
+    'x' * 5000])
 @pytest.mark.parametrize('dtype', [np.uint8, np.uint16])
 def test_what_the_format_says_does_not_matter(declared, dtype):
     image = np.random.default_rng(1).integers(0, np.iinfo(dtype).max, (5, 7), dtype)
@@ -256,6 +257,7 @@ def test_declared_size_is_that_of_the_image(width, height, codec):
     assert declared_size(memoryview(data)[:11]) is None
 
 
-@given(st.binary(max_size=60), st.sampled_from([b'\x89PNG', b'\xff\xd8', b'\xff\xd8\xff\xe0', b'']))
+@given(st.binary(max_size=60),
+       st.sampled_from([b'\x89PNG', b'\xff\xd8', b'\xff\xd8\xff\xe0', b'']))
 def test_declared_size_of_anything_is_found_without_an_error(data, start):
     declared_size(memoryview(start + data))
