@@ -16,11 +16,12 @@
 
 from lmsco_ros.core.config import TrackerConfig
 from lmsco_ros.core.errors import (
-    BoxError, ConfigError, ImageError, LMSCOError, NotInitializedError)
+    BoxError, ConfigError, ImageError, LMSCOError, NotInitializedError, WeightsError)
 from lmsco_ros.core.tracker import LMSCOTracker
 from lmsco_ros.core.types import BoundingBox, TrackResult, TrackState
 
 __all__ = [
     'BoundingBox', 'BoxError', 'ConfigError', 'ImageError', 'LMSCOError', 'LMSCOTracker',
     'NotInitializedError', 'TrackerConfig', 'TrackResult', 'TrackState',
+    'WeightsError',
 ]

@@ -33,3 +33,7 @@ class ConfigError(LMSCOError):
 
 class NotInitializedError(LMSCOError):
     """`update` was called before `initialize`."""
+
+
+class WeightsError(LMSCOError):
+    """Weights of a network are missing, damaged, or those of another network."""

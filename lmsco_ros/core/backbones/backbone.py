@@ -18,13 +18,16 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import ClassVar, TypeVar
 
+import numpy as np
 import torch
 
 from lmsco_ros.core.errors import ConfigError
 
 __all__ = ['Backbone', 'Layer']
+
+_Network = TypeVar('_Network', bound='Backbone')
 
 
 @dataclass(frozen=True)
@@ -38,11 +41,15 @@ class Layer:
         Side of a cell in pixels of the input.
     channels : int
         Number of channels.
+    offset : float
+        Pixels by which the middles of the cells lie behind those of squares of side `stride`
+        that begin at the corner of the input: cell i looks at i * stride + stride / 2 + offset.
 
     """
 
     stride: int
     channels: int
+    offset: float = 0.0
 
 
 class Backbone(torch.nn.Module):
@@ -60,7 +67,9 @@ class Backbone(torch.nn.Module):
         The layers that a configuration for any network may call `shallow` and `deep`.
     margin : int
         Pixels by which the input is extended on every side, so that the middle S / stride cells
-        of every layer cover the middle S pixels.
+        of every layer cover the middle S pixels, to within half a cell: of n cells, the middle
+        ones begin at k = (n - S / stride) // 2 and look k * stride + offset - margin pixels past
+        the middles of the squares they stand for.
 
     """
 
@@ -85,6 +94,42 @@ class Backbone(torch.nn.Module):
             raise ConfigError(f'{cls.__name__} has no layer {name!r}; expected one of '
                               f'{", ".join((*cls.aliases, *cls.layers))}')
         return resolved
+
+    @classmethod
+    def file_shapes(cls) -> dict[str, tuple[int, ...]]:
+        """Return the name and the shape of each array that a file of weights must hold."""
+        with torch.device('meta'):
+            return {name: tuple(tensor.shape) for name, tensor in cls().state_dict().items()}
+
+    @classmethod
+    def own_names(cls, arrays: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
+        """Return the arrays of a foreign file under the names of `file_shapes`."""
+        return dict(arrays)
+
+    @classmethod
+    def from_arrays(cls: type[_Network], arrays: Mapping[str, np.ndarray]) -> _Network:
+        """
+        Return the network with the given weights, ready to run.
+
+        Parameters
+        ----------
+        arrays : mapping of str to ndarray, float32
+            With the names and shapes of `file_shapes`.
+
+        """
+        with torch.device('meta'):
+            network = cls()
+        state = {name: torch.from_numpy(np.array(array, np.float32))
+                 for name, array in cls._state(arrays).items()}
+        network.load_state_dict(state, assign=True)
+        network.eval().requires_grad_(False)
+        # The overload that takes a memory format is missing in the annotations of torch.
+        return network.to(memory_format=torch.channels_last)  # type: ignore[call-overload]
+
+    @classmethod
+    def _state(cls, arrays: Mapping[str, np.ndarray]) -> Mapping[str, np.ndarray]:
+        """Return the state of the module that holds the weights of a file."""
+        return arrays
 
     def forward(self, images: torch.Tensor, layers: Sequence[str]) -> list[torch.Tensor]:
         """

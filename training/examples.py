@@ -1,0 +1,200 @@
+# Copyright 2026 lmsco_ros contributors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Drawing of training examples: one target, seen in several search regions."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+
+from lmsco_ros.core.sampling import FrameView
+from lmsco_ros.core.types import BoundingBox
+from training.degradations import degrade, occlude
+from training.sources import Clip, Still
+
+__all__ = ['Example', 'ExampleSource', 'Spread']
+
+Array = npt.NDArray[np.float32]
+
+
+@dataclass(frozen=True)
+class Spread:
+    """
+    How far a search region may be off its target.
+
+    Attributes
+    ----------
+    shift : float
+        Largest offset of the center, in sides of the target.
+    scale : float
+        Standard deviation of the logarithm of the size.
+    aspect : float
+        Standard deviation of the logarithm of the aspect ratio.
+
+    """
+
+    shift: float
+    scale: float
+    aspect: float
+
+
+@dataclass(frozen=True)
+class Example:
+    """
+    Search regions of one target.
+
+    Attributes
+    ----------
+    patches : ndarray, shape (n, S, S), float32
+        Intensities in the working range; the target is in the middle of the first.
+    offsets : ndarray, shape (n, 4), float32
+        Center (x, y) of the target from the middle, and logarithms of its width and height,
+        relative to the box that each region was laid around.
+
+    """
+
+    patches: Array
+    offsets: Array
+
+
+class ExampleSource:
+    """
+    Draws examples at random.
+
+    Parameters
+    ----------
+    clips : sequence of Clip
+        Real motion.
+    stills : sequence of Still
+        Images that are set moving.
+    size : int
+        Side of the patches.
+    factor : float
+        Side of a region over the side of its target; see `regions`.
+    square : bool
+        Whether regions are square, as the filter's, or have the shape of the target.
+    clip_share : float
+        Share of the examples that come from clips.
+
+    """
+
+    def __init__(self, clips: Sequence[Clip], stills: Sequence[Still], size: int, factor: float,
+                 square: bool, clip_share: float) -> None:
+        self._clips, self._stills = clips, stills
+        self._size, self._factor, self._square = size, factor, square
+        self._clip_share = clip_share if stills else 1.0
+
+    def draw(self, count: int, known: Spread, searched: Spread,
+             rng: np.random.Generator) -> Example:
+        """
+        Return an example of `count` regions.
+
+        Parameters
+        ----------
+        count : int
+            Regions.
+        known, searched : Spread
+            How far the first regions, and the last one, are off the target.
+        rng : Generator
+            Source of chance.
+
+        """
+        moving = rng.random() < self._clip_share
+        sights = self._from_clip(count, rng) if moving else self._from_still(count, rng)
+        inverted = rng.random() < 0.5
+        patches, offsets = [], []
+        for i, (view, box) in enumerate(sights):
+            last = i == count - 1
+            guess = _jitter(box, searched if last else known, rng)
+            patch = self._patch(view, guess)
+            if last and rng.random() < 0.1:
+                patch = occlude(patch, self._size / self._factor, rng)
+            patch = degrade(patch, rng)
+            patches.append(1 - patch if inverted else patch)
+            offsets.append(_offset(box, guess))
+        return _flip(Example(np.stack(patches), np.array(offsets, np.float32)), rng)
+
+    def _patch(self, view: FrameView, box: BoundingBox) -> Array:
+        """Return the search region around a box."""
+        side = (box.area**0.5,) * 2 if self._square else box.size
+        region = BoundingBox.from_center(
+            box.center, (self._factor * side[0], self._factor * side[1]))
+        return view.patch(region, (self._size, self._size))
+
+    def _from_clip(self, count: int,
+                   rng: np.random.Generator) -> list[tuple[FrameView, BoundingBox]]:
+        """Return frames of one clip, at most some seconds apart, in any order."""
+        clip = self._clips[rng.integers(len(self._clips))]
+        present = clip.present
+        reach = int(rng.integers(2, 120))
+        start = int(rng.integers(len(present)))
+        near = present[max(0, start - reach):start + reach]
+        chosen = rng.choice(near, count, replace=len(near) < count)
+        return [(clip.view(int(i)), clip.box(int(i))) for i in chosen]
+
+    def _from_still(self, count: int,
+                    rng: np.random.Generator) -> list[tuple[FrameView, BoundingBox]]:
+        """Return one image, turned and stretched around one of its targets."""
+        still = self._stills[rng.integers(len(self._stills))]
+        box = still.pick(rng)
+        view = still.view()
+        return [(view, box)] + [_moved(view, box, rng) for _ in range(count - 1)]
+
+
+def _jitter(box: BoundingBox, spread: Spread, rng: np.random.Generator) -> BoundingBox:
+    """Return a box that is a bit off."""
+    side = box.area**0.5
+    shift = rng.uniform(-spread.shift, spread.shift, 2) * side
+    scale = np.exp(rng.normal(0, spread.scale))
+    stretch = np.exp(rng.normal(0, spread.aspect / 2))
+    center = (box.center[0] + shift[0], box.center[1] + shift[1])
+    return BoundingBox.from_center(
+        center, (box.width * scale * stretch, box.height * scale / stretch))
+
+
+def _offset(box: BoundingBox, guess: BoundingBox) -> tuple[float, float, float, float]:
+    """Return where a box is, in sizes of the guess, and its size in logarithms."""
+    return ((box.center[0] - guess.center[0]) / guess.width,
+            (box.center[1] - guess.center[1]) / guess.height,
+            float(np.log(box.width / guess.width)), float(np.log(box.height / guess.height)))
+
+
+def _moved(view: FrameView, box: BoundingBox,
+           rng: np.random.Generator) -> tuple[FrameView, BoundingBox]:
+    """Return the image turned a little around the target and stretched, with the new box."""
+    turn = np.deg2rad(rng.normal(0, 4))
+    stretch = np.exp(rng.normal(0, 0.15) + rng.normal(0, 0.06, 2))
+    rotation = np.array([[np.cos(turn), -np.sin(turn)], [np.sin(turn), np.cos(turn)]])
+    linear = rotation @ np.diag(stretch)
+    center = np.array(box.center)
+    matrix = np.column_stack([linear, center - linear @ center])
+    image = cv2.warpAffine(view.image, matrix, view.size, flags=cv2.INTER_LINEAR,
+                           borderMode=cv2.BORDER_REFLECT)
+    size = (box.width * stretch[0], box.height * stretch[1])
+    return FrameView(image, view.intensity), BoundingBox.from_center(box.center, size)
+
+
+def _flip(example: Example, rng: np.random.Generator) -> Example:
+    """Return the example or one of its mirror images."""
+    patches, offsets = example.patches, example.offsets.copy()
+    if rng.random() < 0.5:
+        patches, offsets[:, 0] = patches[:, :, ::-1], -offsets[:, 0]
+    if rng.random() < 0.5:
+        patches, offsets[:, 1] = patches[:, ::-1], -offsets[:, 1]
+    return Example(np.ascontiguousarray(patches), offsets)
