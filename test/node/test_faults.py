@@ -31,6 +31,8 @@ from msg_adapters.image import ENCODINGS
 from msg_adapters.status import diagnoses_from_message, Level
 
 SIZES = st.integers(0, 70) | st.integers(0, 2 ** 32 - 1)
+# On the wire a string ends at its first zero.
+TEXTS = st.text(st.characters(codec='utf-8', exclude_characters='\0'), max_size=8)
 SECOND = 10 ** 9
 
 
@@ -38,9 +40,9 @@ SECOND = 10 ** 9
 def wild_images(draw):
     """Draw any image that the message type can hold, most of them nonsense."""
     message = Image(
-        header=Header(frame_id=draw(st.text(max_size=5))), height=draw(SIZES),
+        header=Header(frame_id=draw(TEXTS)), height=draw(SIZES),
         width=draw(SIZES), step=draw(SIZES), is_bigendian=draw(st.integers(0, 255)),
-        encoding=draw(st.sampled_from(sorted(ENCODINGS)) | st.text(max_size=8)),
+        encoding=draw(st.sampled_from(sorted(ENCODINGS)) | TEXTS),
         data=array('B', draw(st.binary(max_size=300))))
     message.header.stamp.sec = draw(st.integers(-2 ** 31, 2 ** 31 - 1))
     message.header.stamp.nanosec = draw(st.integers(0, 2 ** 32 - 1))

@@ -80,12 +80,12 @@ def interface():
     for transport in ('raw', 'compressed'):
         context = rclpy.Context()
         rclpy.init(context=context)
-        # A name of its own: others on this machine may be called as the policy says.
-        node = TrackerNode('tracker_under_policy', context=context, parameter_overrides=[
+        # A name of its own: the graph may still know of another that is called the same.
+        name = f'{transport}_under_policy'
+        node = TrackerNode(name, context=context, parameter_overrides=[
             Parameter('image_transport', value=transport), Parameter('use_sim_time', value=True)])
         for rule, names in _told(node).items():
-            found[rule] |= {name.replace('/tracker_under_policy', '/lmsco_tracker')
-                            for name in names}
+            found[rule] |= {full.replace(f'/{name}', '/lmsco_tracker') for full in names}
         node.destroy_node()
         rclpy.shutdown(context=context)
     return found
