@@ -71,11 +71,11 @@ def occlude(patch: Patch, target: float, rng: np.random.Generator) -> Patch:
     """
     size = patch.shape[0]
     side = np.maximum(1, rng.uniform(0.3, 0.8, 2) * target).astype(int)
-    corner = (size / 2 + rng.uniform(-0.7, 0.3, 2) * target).astype(int)
+    corner = np.maximum(0, size / 2 + rng.uniform(-0.7, 0.3, 2) * target).astype(int)
     source = rng.integers(0, size - side)
     result = patch.copy()
-    covered = patch[source[0]:source[0] + side[0], source[1]:source[1] + side[1]]
-    result[corner[0]:corner[0] + side[0], corner[1]:corner[1] + side[1]] = covered
+    hidden = result[corner[0]:corner[0] + side[0], corner[1]:corner[1] + side[1]]
+    hidden[:] = patch[source[0]:, source[1]:][:hidden.shape[0], :hidden.shape[1]]
     return result
 
 

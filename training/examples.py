@@ -64,8 +64,9 @@ class Example:
     patches : ndarray, shape (n, S, S), float32
         Intensities in the working range; the target is in the middle of the first.
     offsets : ndarray, shape (n, 4), float32
-        Center (x, y) of the target from the middle, and logarithms of its width and height,
-        relative to the box that each region was laid around.
+        Center (x, y) of the target from the middle of the region, in sides of the region over
+        the factor, and logarithms of its width and height over those of the box that the region
+        was laid around.
 
     """
 
@@ -127,15 +128,26 @@ class ExampleSource:
                 patch = occlude(patch, self._size / self._factor, rng)
             patch = degrade(patch, rng)
             patches.append(1 - patch if inverted else patch)
-            offsets.append(_offset(box, guess))
+            offsets.append(self._offset(box, guess))
         return _flip(Example(np.stack(patches), np.array(offsets, np.float32)), rng)
 
     def _patch(self, view: FrameView, box: BoundingBox) -> Array:
         """Return the search region around a box."""
-        side = (box.area**0.5,) * 2 if self._square else box.size
+        width, height = self._sides(box)
         region = BoundingBox.from_center(
-            box.center, (self._factor * side[0], self._factor * side[1]))
+            box.center, (self._factor * width, self._factor * height))
         return view.patch(region, (self._size, self._size))
+
+    def _sides(self, box: BoundingBox) -> tuple[float, float]:
+        """Return the sides of the region around a box, over the factor."""
+        return (box.area**0.5,) * 2 if self._square else box.size
+
+    def _offset(self, box: BoundingBox, guess: BoundingBox) -> tuple[float, float, float, float]:
+        """Return where a box is in the region around the guess, and its size."""
+        width, height = self._sides(guess)
+        return ((box.center[0] - guess.center[0]) / width,
+                (box.center[1] - guess.center[1]) / height,
+                float(np.log(box.width / guess.width)), float(np.log(box.height / guess.height)))
 
     def _from_clip(self, count: int,
                    rng: np.random.Generator) -> list[tuple[FrameView, BoundingBox]]:
@@ -166,13 +178,6 @@ def _jitter(box: BoundingBox, spread: Spread, rng: np.random.Generator) -> Bound
     center = (box.center[0] + shift[0], box.center[1] + shift[1])
     return BoundingBox.from_center(
         center, (box.width * scale * stretch, box.height * scale / stretch))
-
-
-def _offset(box: BoundingBox, guess: BoundingBox) -> tuple[float, float, float, float]:
-    """Return where a box is, in sizes of the guess, and its size in logarithms."""
-    return ((box.center[0] - guess.center[0]) / guess.width,
-            (box.center[1] - guess.center[1]) / guess.height,
-            float(np.log(box.width / guess.width)), float(np.log(box.height / guess.height)))
 
 
 def _moved(view: FrameView, box: BoundingBox,

@@ -17,6 +17,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+import sys
 from typing import Any
 
 from array_api_compat import array_namespace, is_torch_array
@@ -106,6 +107,8 @@ def limit_threads(count: int) -> None:
     """
     cv2.setNumThreads(count)
     threadpool_limits(limits=count)
+    if 'torch' in sys.modules:
+        sys.modules['torch'].set_num_threads(count)
 
 
 def rfft2(values: Array) -> Array:

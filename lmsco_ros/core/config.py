@@ -17,7 +17,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, replace
 import math
 from pathlib import Path
 from typing import Any
@@ -25,304 +25,21 @@ from typing import Any
 import yaml
 
 from lmsco_ros.core.errors import ConfigError
-from lmsco_ros.core.validation import build, check_choice, check_range
+from lmsco_ros.core.sections import (
+    ChannelConfig, ConfidenceConfig, FeatureConfig, IntensityConfig, LearningConfig, MotionConfig,
+    NetworkConfig, RegistrationConfig, RuntimeConfig, SamplingConfig, ScaleConfig)
+from lmsco_ros.core.validation import build, check_range
 
 __all__ = [
     'ChannelConfig', 'ConfidenceConfig', 'FeatureConfig', 'IntensityConfig', 'LearningConfig',
-    'RuntimeConfig', 'SamplingConfig', 'ScaleConfig', 'TrackerConfig',
+    'MotionConfig', 'NetworkConfig', 'RegistrationConfig', 'RuntimeConfig', 'SamplingConfig',
+    'ScaleConfig', 'TrackerConfig',
 ]
 
 _FEWEST_CELLS = 5
-_LARGEST_SCALE = 4.0
 
-
-@dataclass(frozen=True)
-class IntensityConfig:
-    """
-    From counts to the working range.
-
-    Attributes
-    ----------
-    low_percentile, high_percentile : float
-        Percentiles of the frame that become 0 and 1.
-    smoothing : float
-        Part of the way that the range follows a small change in one frame, in (0, 1].
-    jump : float
-        Change, as a part of the range, above which the range is adopted at once.
-
-    """
-
-    low_percentile: float = 1.0
-    high_percentile: float = 99.0
-    smoothing: float = 0.2
-    jump: float = 0.1
-
-    def __post_init__(self) -> None:
-        """Check the ranges."""
-        check_range(self, 'low_percentile', 0, 49)
-        check_range(self, 'high_percentile', 51, 100)
-        check_range(self, 'smoothing', 0, 1, open_low=True)
-        check_range(self, 'jump', 0, 1)
-
-
-@dataclass(frozen=True)
-class SamplingConfig:
-    """
-    The search region and its patch.
-
-    Attributes
-    ----------
-    search_factor : float
-        Side of the square search region over sqrt(target width * height).
-    patch_size_min, patch_size_max : int
-        Limits of the side of the patch, in pixels, into which the search region is resampled;
-        the nearest size that fits the cells and the Fourier transform is taken.
-
-    """
-
-    search_factor: float = 5.0
-    patch_size_min: int = 140
-    patch_size_max: int = 140
-
-    def __post_init__(self) -> None:
-        """Check the ranges."""
-        check_range(self, 'search_factor', 1.5, 10)
-        check_range(self, 'patch_size_min', 32, 1024)
-        check_range(self, 'patch_size_max', self.patch_size_min, 1024)
-
-
-@dataclass(frozen=True)
-class ChannelConfig:
-    """
-    A group of feature channels, normalized on its own.
-
-    Attributes
-    ----------
-    kind : {'hog', 'intensity'}
-        What the channels are.
-    weight : float
-        Factor on the normalized channels.
-
-    """
-
-    kind: str
-    weight: float = 1.0
-
-    def __post_init__(self) -> None:
-        """Check the ranges."""
-        check_choice(self, 'kind', ('hog', 'intensity'))
-        check_range(self, 'weight', 0, 100, open_low=True)
-
-
-@dataclass(frozen=True)
-class FeatureConfig:
-    """
-    One block: groups of channels on a common grid.
-
-    Attributes
-    ----------
-    channels : tuple of ChannelConfig
-        The groups.
-    cell : int
-        Side of a cell in patch pixels.
-
-    """
-
-    channels: tuple[ChannelConfig, ...]
-    cell: int = 4
-
-    def __post_init__(self) -> None:
-        """Check the ranges."""
-        if not self.channels:
-            raise ConfigError('FeatureConfig.channels is empty; name at least one group, '
-                              'for instance {kind: hog}')
-        check_range(self, 'cell', 1, 32)
-
-
-@dataclass(frozen=True)
-class LearningConfig:
-    """
-    Training of the structured correlation filter.
-
-    Attributes
-    ----------
-    anchor : {'unit', 'coupled', 'frozen'}
-        Reading of s(y0) in the margin; `frozen` is the literal (11)-(12) and diverges.
-    solve : {'joint', 'per_block'}
-        One problem for all blocks, or one for each.
-    core : float
-        Label above which the unit anchor's loss is two-sided; 0 is ridge regression.
-    margin_weight : float
-        C of the paper's (7).
-    label_sigma : float
-        Standard deviation of the label over sqrt(target width * height).
-    window_minimum, window_edge : float
-        Spatial window at the center of the target and in the middle of its sides.
-    window_sparsity : float
-        Window coefficients below this part of the largest are dropped.
-    memory_size : int
-        Training samples kept.
-    learning_rate : float
-        Of the prior weights of the samples.
-    initial_iterations : int
-        Outer iterations in the first frame.
-    iterations : int
-        Outer iterations of an update.
-    gradient_steps : int
-        Conjugate gradient steps in each outer iteration.
-    update_interval : int
-        Frames between two updates; every frame is stored.
-
-    """
-
-    anchor: str = 'unit'
-    solve: str = 'joint'
-    core: float = 0.5
-    margin_weight: float = 1.0
-    label_sigma: float = 1 / 12
-    window_minimum: float = 0.02
-    window_edge: float = 0.06
-    window_sparsity: float = 0.05
-    memory_size: int = 30
-    learning_rate: float = 0.01
-    initial_iterations: int = 30
-    iterations: int = 3
-    gradient_steps: int = 2
-    update_interval: int = 5
-
-    def __post_init__(self) -> None:
-        """Check the ranges."""
-        check_choice(self, 'anchor', ('unit', 'coupled', 'frozen'))
-        check_choice(self, 'solve', ('joint', 'per_block'))
-        check_range(self, 'core', 0, 1)
-        check_range(self, 'margin_weight', 0, 1e6, open_low=True)
-        check_range(self, 'label_sigma', 0, 1, open_low=True)
-        check_range(self, 'window_minimum', 0, 1e3, open_low=True)
-        check_range(self, 'window_edge', self.window_minimum, 1e3)
-        check_range(self, 'window_sparsity', 0, 1)
-        check_range(self, 'memory_size', 1, 1000)
-        check_range(self, 'learning_rate', 0, 0.5)
-        for name in ('initial_iterations', 'iterations', 'gradient_steps', 'update_interval'):
-            check_range(self, name, 1, 1000)
-
-
-@dataclass(frozen=True)
-class ScaleConfig:
-    """
-    How the size of the target is followed.
-
-    Attributes
-    ----------
-    estimator : {'filter', 'search', 'none'}
-        One-dimensional scale filter (DSST), search over scaled patches (the paper), or a
-        constant size.
-    step : float
-        Ratio of two neighboring scales.
-    exponent_min, exponent_max : int
-        Range of the exponents of `step`.
-    learning_rate : float
-        Of the scale filter, which learns in the frames in which the filter is trained.
-    model_area : float
-        Area of a scale sample in pixels.
-    padding : float
-        Side of a scale sample over that of the target.
-    regularization : float
-        Ridge term of the scale filter.
-    label_sigma : float
-        Standard deviation of its label, in scales.
-
-    """
-
-    estimator: str = 'filter'
-    step: float = 1.02
-    exponent_min: int = -8
-    exponent_max: int = 8
-    learning_rate: float = 0.12
-    model_area: float = 512.0
-    padding: float = 1.0
-    regularization: float = 0.01
-    label_sigma: float = 1.0
-
-    def __post_init__(self) -> None:
-        """Check the ranges."""
-        check_choice(self, 'estimator', ('filter', 'search', 'none'))
-        check_range(self, 'step', 1, 2, open_low=True)
-        check_range(self, 'exponent_min', -50, 0)
-        check_range(self, 'exponent_max', 0, 50)
-        check_range(self, 'learning_rate', 0, 1)
-        check_range(self, 'model_area', 64, 65536)
-        check_range(self, 'padding', 1, 4)
-        check_range(self, 'regularization', 0, 100, open_low=True)
-        check_range(self, 'label_sigma', 0, 50, open_low=True)
-        reach = self.step**max(self.exponent_max, -self.exponent_min)
-        if reach > _LARGEST_SCALE:
-            raise ConfigError(f'ScaleConfig.step and its exponents reach a factor of {reach:g} '
-                              f'from one frame to the next; expected at most {_LARGEST_SCALE:g}')
-
-
-@dataclass(frozen=True)
-class ConfidenceConfig:
-    """
-    When the target counts as lost and as found again.
-
-    Attributes
-    ----------
-    reference_frames : int
-        Frames after the start whose median sharpness is the measure of all later ones.
-    uncertain, lost : float
-        Sharpness, as a part of the reference, below which the state is UNCERTAIN, and below
-        which the frame is neither believed nor learned from.
-    lost_frames : int
-        Frames in a row below `lost` until the state is LOST.
-    found : float
-        Sharpness, as a part of the reference, from which a LOST target counts as found.
-    tiles : int
-        Other regions of the image that are searched per frame while the target is missing.
-
-    """
-
-    reference_frames: int = 10
-    uncertain: float = 0.3
-    lost: float = 0.15
-    lost_frames: int = 5
-    found: float = 0.4
-    tiles: int = 4
-
-    def __post_init__(self) -> None:
-        """Check the ranges."""
-        check_range(self, 'reference_frames', 1, 1000)
-        check_range(self, 'lost', 0, 1)
-        check_range(self, 'uncertain', self.lost, 1)
-        check_range(self, 'found', self.lost, 2)
-        check_range(self, 'lost_frames', 1, 1000)
-        check_range(self, 'tiles', 0, 64)
-
-
-@dataclass(frozen=True)
-class RuntimeConfig:
-    """
-    Where the tracker computes.
-
-    Attributes
-    ----------
-    device : str
-        'cpu', 'cuda' or 'cuda:N'.
-    threads : int
-        Threads of the numerical libraries in this process.
-
-    """
-
-    device: str = 'cpu'
-    threads: int = 1
-
-    def __post_init__(self) -> None:
-        """Check the ranges."""
-        check_range(self, 'threads', 1, 256)
-
-
-def _hcs_features() -> tuple[FeatureConfig, ...]:
-    """Return the handcrafted block."""
-    return (FeatureConfig((ChannelConfig('hog'), ChannelConfig('intensity', weight=4.0))),)
+HANDCRAFTED = (FeatureConfig((ChannelConfig('hog'), ChannelConfig('intensity', weight=4.0))),)
+"""The block of the paper's `hcs`; intensity takes the place of the colors."""
 
 
 @dataclass(frozen=True)
@@ -334,7 +51,8 @@ class TrackerConfig:
     ----------
     features : tuple of FeatureConfig
         Feature blocks.
-    intensity, sampling, learning, scale, confidence, runtime
+    intensity, sampling, networks, motion, learning, scale, registration, confidence,
+    runtime
         Sections, described in their classes.
     newton_steps : int
         Refinement of the score's maximum.
@@ -346,11 +64,14 @@ class TrackerConfig:
 
     """
 
-    features: tuple[FeatureConfig, ...] = field(default_factory=_hcs_features)
+    features: tuple[FeatureConfig, ...] = HANDCRAFTED
     intensity: IntensityConfig = IntensityConfig()
     sampling: SamplingConfig = SamplingConfig()
+    networks: NetworkConfig = NetworkConfig()
+    motion: MotionConfig = MotionConfig()
     learning: LearningConfig = LearningConfig()
     scale: ScaleConfig = ScaleConfig()
+    registration: RegistrationConfig = RegistrationConfig()
     confidence: ConfidenceConfig = ConfidenceConfig()
     runtime: RuntimeConfig = RuntimeConfig()
     newton_steps: int = 5
@@ -430,7 +151,27 @@ def _merge(base: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, Any
     return merged
 
 
-_PRESETS: Mapping[str, TrackerConfig] = {
-    'default': TrackerConfig(),
-    'hcs': TrackerConfig(),
-}
+def _presets() -> Mapping[str, TrackerConfig]:
+    """Return the presets: ours, then the paper and its ablation, one factor apart."""
+    appearance = (FeatureConfig((ChannelConfig('appearance', layer='shallow'),), cell=4),
+                  FeatureConfig((ChannelConfig('appearance', layer='deep'),), cell=16))
+    motion = (FeatureConfig((ChannelConfig('motion', layer='deep'),), cell=16),)
+    paper = TrackerConfig(
+        features=appearance + motion,
+        sampling=SamplingConfig(patch_size_min=200, patch_size_max=300),
+        networks=NetworkConfig('vgg_m_2048', 'motion_cnn'),
+        scale=ScaleConfig('search', step=1.03, exponent_min=-4, exponent_max=5))
+    unscaled = replace(paper, scale=ScaleConfig('none'))
+    return {
+        'default': TrackerConfig(
+            features=(FeatureConfig((ChannelConfig('appearance', layer='features'),)),),
+            sampling=SamplingConfig(patch_size_min=100, patch_size_max=100)),
+        'paper': paper,
+        'mas': paper,
+        'ma': unscaled,
+        'a': replace(unscaled, features=appearance),
+        'hcs': replace(paper, features=HANDCRAFTED),
+    }
+
+
+_PRESETS = _presets()

@@ -137,10 +137,10 @@ def patch_size(size: tuple[float, float], config: SamplingConfig, cell: int) -> 
 
 
 def _is_fast_odd(number: int) -> bool:
-    """Return whether `number` is odd and its prime factors are at most 11."""
+    """Return whether `number` is odd and its prime factors are at most 13."""
     if number % 2 == 0:
         return False
-    for prime in (3, 5, 7, 11):
+    for prime in (3, 5, 7, 11, 13):
         while number % prime == 0:
             number //= prime
     return number == 1

@@ -16,19 +16,22 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from lmsco_ros.core.backend import Array, array_namespace, Backend
+from lmsco_ros.core.backend import Array, Backend
 from lmsco_ros.core.confidence import ConfidenceMonitor, peak_to_sidelobe_ratio
 from lmsco_ros.core.config import TrackerConfig
 from lmsco_ros.core.errors import ImageError
 from lmsco_ros.core.features.extractor import FeatureExtractor
+from lmsco_ros.core.features.motion import MotionObserver
 from lmsco_ros.core.fourier.localization import centered_map, locate, Peak
 from lmsco_ros.core.fourier.series import grid_size, shift
 from lmsco_ros.core.intensity import AutomaticGain
 from lmsco_ros.core.learning.structured_operator import StructuredOperator
+from lmsco_ros.core.registration import Registration
 from lmsco_ros.core.sampling import (
     check_box, clamp_box, FrameView, patch_size, region_around, search_tiles)
 from lmsco_ros.core.scale import make_scale_estimator
@@ -85,6 +88,8 @@ class Track:
         How to track.
     backend : Backend
         Where the filter is computed.
+    networks : mapping of str to Backbone
+        Networks of the feature blocks.
     image : ndarray
         First frame.
     box : BoundingBox
@@ -99,8 +104,8 @@ class Track:
 
     """
 
-    def __init__(self, config: TrackerConfig, backend: Backend, image: np.ndarray,
-                 box: BoundingBox) -> None:
+    def __init__(self, config: TrackerConfig, backend: Backend, networks: Mapping[str, object],
+                 image: np.ndarray, box: BoundingBox) -> None:
         self.image_shape, self.image_type = image.shape, image.dtype
         check_box(box, (image.shape[1], image.shape[0]))
         self._config = config
@@ -110,12 +115,17 @@ class Track:
         self._gain = AutomaticGain(config.intensity)
         self._monitor = ConfidenceMonitor(config.confidence)
         self._patch_size = patch_size(box.size, config.sampling, config.cell)
-        self._extractor = FeatureExtractor(config.features, self._patch_size, backend)
+        self._extractor = FeatureExtractor(config, networks, self._patch_size, backend)
+        self._motion = MotionObserver(config.motion) if 'motion' in networks else None
         view = FrameView(image, self._gain.observe(image))
         self._operator = self._learn_first(view, backend)
         self._scale = make_scale_estimator(config.scale, box.size)
         self._scale.learn(view, box)
+        self._registration = Registration(
+            config.registration, networks['registration'], view, box) if (
+            'registration' in networks) else None
         self._first = self._detect(view, box)
+        self._watch(view)
 
     def first_result(self) -> TrackResult:
         """Return the result of the first frame: the given box."""
@@ -133,6 +143,7 @@ class Track:
         if believed:
             self._follow(view, detection)
             self._learn(view, detection)
+        self._watch(view)
         return self._result(detection, self._monitor.score(detection.sharpness), state)
 
     def _result(self, detection: Detection, score: float, state: TrackState) -> TrackResult:
@@ -143,29 +154,46 @@ class Track:
     def _learn_first(self, view: FrameView, backend: Backend) -> StructuredOperator:
         """Train the filter on the first frame."""
         region = region_around(self._box, self._config.sampling)
-        patch = view.patch(region, (self._patch_size,) * 2)
+        patch = self._patch(view, region)
         if float(patch.max() - patch.min()) <= 0:
             raise ImageError('the image is constant around the box; '
                              'expected a target that differs from its background')
         target = (self._box.height / region.height, self._box.width / region.width)
-        return StructuredOperator(self._config.learning, self._extractor(patch), target, backend)
+        sample = [block[:, :, 0, :] for block in self._extractor(patch[None])]
+        return StructuredOperator(self._config.learning, sample, target, backend)
 
     def _detect(self, view: FrameView, box: BoundingBox) -> Detection:
         """Search for the target around `box`, at all scales of the scale estimator."""
-        regions = [region_around(box.scaled(factor), self._config.sampling)
-                   for factor in self._scale.search_factors]
-        samples = [self._extractor(view.patch(region, (self._patch_size,) * 2))
-                   for region in regions]
-        xp = array_namespace(samples[0][0])
-        stacked = [xp.stack(block, axis=2) for block in zip(*samples, strict=True)]
-        scores = self._operator.scores(stacked)
+        factors = self._scale.search_factors
+        regions = [region_around(box.scaled(factor), self._config.sampling) for factor in factors]
+        patches = np.stack([self._patch(view, region) for region in regions])
+        samples = self._extractor(patches, self._moving(regions, patches, factors))
+        scores = self._operator.scores(samples)
         grid = grid_size(int(scores.shape[1]) - 1)
         peak = locate(scores, grid, self._config.newton_steps)
         best = peak.scale_index
         sharpness = peak_to_sidelobe_ratio(
             peak.grid, round(grid / (2 * self._config.sampling.search_factor)))
         return Detection(regions[best], self._scale.found_factor(peak.scale_values), peak,
-                         samples[best], sharpness)
+                         [block[:, :, best, :] for block in samples], sharpness)
+
+    def _patch(self, view: FrameView, region: BoundingBox) -> np.ndarray:
+        """Return the patch of a search region."""
+        return view.patch(region, (self._patch_size,) * 2)
+
+    def _moving(self, regions: Sequence[BoundingBox], patches: np.ndarray,
+                factors: Sequence[float]) -> np.ndarray | None:
+        """Return the flow images of the regions, or None where there is nothing to see."""
+        if self._motion is None:
+            return None
+        unscaled = factors.index(1.0)
+        return self._motion.images(regions[unscaled], patches[unscaled], factors)
+
+    def _watch(self, view: FrameView) -> None:
+        """Take note of where the target is expected next, to see what moves there."""
+        if self._motion is not None:
+            region = region_around(self._box, self._config.sampling)
+            self._motion.remember(region, self._patch(view, region))
 
     def _search_elsewhere(self, view: FrameView, here: Detection) -> Detection:
         """Return a convincing detection in the next tiles of the image, or `here`."""
@@ -187,8 +215,10 @@ class Track:
         self._tile = 0
         moved = self._box.moved_to(detection.center).scaled(detection.scale)
         moved = clamp_box(moved, view.size)
-        factor = self._scale.estimate(view, moved)
-        self._box = clamp_box(moved.scaled(factor), view.size)
+        moved = moved.scaled(self._scale.estimate(view, moved))
+        if self._registration is not None:
+            moved = self._registration(view, moved).box
+        self._box = clamp_box(moved, view.size)
 
     def _learn(self, view: FrameView, detection: Detection) -> None:
         """Store the sample; when it is time, train the filter and the scale estimator."""

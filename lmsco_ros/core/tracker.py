@@ -27,6 +27,7 @@ from lmsco_ros.core.backend import limit_threads, select_backend
 from lmsco_ros.core.config import TrackerConfig
 from lmsco_ros.core.errors import ImageError, NotInitializedError
 from lmsco_ros.core.intensity import check_image
+from lmsco_ros.core.networks import load_networks
 from lmsco_ros.core.track import Track
 from lmsco_ros.core.types import BoundingBox, TrackResult
 
@@ -45,7 +46,9 @@ class LMSCOTracker:
     Raises
     ------
     ConfigError
-        When the configured device is not available.
+        When the configured device is not available, or a network does not fit its blocks.
+    WeightsError
+        When the weights of a network are missing or damaged.
 
     Notes
     -----
@@ -57,6 +60,7 @@ class LMSCOTracker:
     def __init__(self, config: TrackerConfig | None = None) -> None:
         self.config = config or TrackerConfig.preset('default')
         self._backend = select_backend(self.config.runtime.device)
+        self._networks = load_networks(self.config)
         limit_threads(self.config.runtime.threads)
         self._track: Track | None = None
 
@@ -88,7 +92,7 @@ class LMSCOTracker:
 
         """
         check_image(image)
-        self._track = Track(self.config, self._backend, image, box)
+        self._track = Track(self.config, self._backend, self._networks, image, box)
         return self._track.first_result()
 
     def update(self, image: np.ndarray) -> TrackResult:

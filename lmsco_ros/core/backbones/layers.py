@@ -19,9 +19,10 @@ from __future__ import annotations
 import numpy as np
 import torch
 
-__all__ = ['LocalResponseNorm', 'fold_gray', 'fold_mean', 'pool']
+__all__ = ['LocalResponseNorm', 'fold_gray', 'fold_mean', 'pool', 'standardize']
 
 _CACHED_NUMBERS = 1 << 17
+_CONTRAST_FLOOR = 0.02
 
 
 class LocalResponseNorm(torch.nn.Module):
@@ -112,3 +113,9 @@ def fold_gray(weight: np.ndarray, bias: np.ndarray, mean: np.ndarray,
     """
     summed = scale * weight.astype(np.float64).sum(axis=1, keepdims=True)
     return summed.astype(np.float32), fold_mean(weight, bias, mean)
+
+
+def standardize(images: torch.Tensor) -> torch.Tensor:
+    """Return one-channel images (n, 1, H, W) with zero mean and about unit contrast."""
+    deviation, mean = torch.std_mean(images, dim=(2, 3), keepdim=True)
+    return (images - mean) / (deviation + _CONTRAST_FLOOR)

@@ -20,7 +20,9 @@ from dataclasses import dataclass
 
 from lmsco_ros.core.backbones.backbone import Backbone
 from lmsco_ros.core.backbones.motion_cnn import MotionCNN
+from lmsco_ros.core.backbones.registration import RegistrationNet
 from lmsco_ros.core.backbones.squeezenet import SqueezeNet
+from lmsco_ros.core.backbones.thermal import ThermalFlowNet, ThermalNet
 from lmsco_ros.core.backbones.vgg_m import VGGM
 from lmsco_ros.core.errors import WeightsError
 
@@ -64,6 +66,27 @@ class WeightsSource:
 
 
 WEIGHTS = (
+    WeightsSource(
+        name='thermal',
+        purpose='appearance of small and large targets in thermal images, trained here',
+        architecture=ThermalNet,
+        license='Apache-2.0',
+        file_name='thermal.safetensors',
+        bundled=True),
+    WeightsSource(
+        name='thermal_flow',
+        purpose='motion of targets against their background, trained here',
+        architecture=ThermalFlowNet,
+        license='Apache-2.0',
+        file_name='thermal_flow.safetensors',
+        bundled=True),
+    WeightsSource(
+        name='registration',
+        purpose='size, aspect and presence of a target against its first frame, trained here',
+        architecture=RegistrationNet,
+        license='Apache-2.0',
+        file_name='registration.safetensors',
+        bundled=True),
     WeightsSource(
         name='vgg_m_2048',
         purpose='appearance network of the paper, trained on ImageNet',

@@ -22,10 +22,9 @@ import torch
 from torch import nn
 
 from lmsco_ros.core.backbones.backbone import Backbone, Layer
+from lmsco_ros.core.backbones.layers import standardize
 
 __all__ = ['ThermalNet', 'ThermalFlowNet']
-
-_CONTRAST_FLOOR = 0.02
 
 
 class _CompactNet(Backbone):
@@ -82,9 +81,7 @@ class ThermalNet(_CompactNet):
 
     def _prepare(self, images: torch.Tensor) -> torch.Tensor:
         """Return the images with zero mean and about unit contrast."""
-        mean = images.mean(dim=(2, 3), keepdim=True)
-        deviation = images.std(dim=(2, 3), keepdim=True)
-        return (images - mean) / (deviation + _CONTRAST_FLOOR)
+        return standardize(images)
 
 
 class ThermalFlowNet(_CompactNet):

@@ -1,0 +1,130 @@
+# Copyright 2026 lmsco_ros contributors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Layers of a network as feature channels (paper, section III-A)."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import numpy as np
+import torch
+
+from lmsco_ros.core.backbones.backbone import Backbone
+from lmsco_ros.core.backend import Array, Backend
+from lmsco_ros.core.errors import ConfigError
+
+__all__ = ['NetworkChannels']
+
+_INPUT_CHANNELS = {'appearance': 1, 'motion': 3}
+
+
+class NetworkChannels:
+    """
+    All the maps that the blocks need of one network, from a single pass.
+
+    Parameters
+    ----------
+    network : Backbone
+        Appearance or motion network, ready to run.
+    kind : {'appearance', 'motion'}
+        What the network is to show.
+    requests : iterable of tuple (str, int)
+        Layer and side of the cells in pixels; a multiple of the layer's own.
+    size : int
+        Side of the patches.
+    backend : Backend
+        Where the network runs and the channels go.
+
+    Raises
+    ------
+    ConfigError
+        When the network is of the other kind or lacks a layer, or a cell does not consist of whole cells of the layer.
+
+    """
+
+    def __init__(self, network: Backbone, kind: str, requests: Iterable[tuple[str, int]],
+                 size: int, backend: Backend) -> None:
+        _check_kind(network, kind)
+        self._requests = [(network.layer_name(layer), cell)
+                          for layer, cell in dict.fromkeys(requests)]
+        self._layers = tuple(dict.fromkeys(layer for layer, _ in self._requests))
+        self._names = list(dict.fromkeys(requests))
+        for layer, cell in self._requests:
+            _check_cell(network, layer, cell)
+        self._backend = backend
+        self._device = torch.device(backend.device)
+        self._network = network.to(self._device)
+        self._size = size
+
+    def channels(self, layer: str) -> int:
+        """Return the number of channels of a layer."""
+        return self._network.layers[self._network.layer_name(layer)].channels
+
+    @torch.inference_mode()
+    def __call__(self, patches: np.ndarray) -> dict[tuple[str, int], Array]:
+        """
+        Return the channels of every request, under the request.
+
+        Parameters
+        ----------
+        patches : ndarray, shape (n, size, size) or (n, size, size, 3), float32
+            Intensities in the working range, or flow images.
+
+        Returns
+        -------
+        dict of array, shape (n, size // cell, size // cell, C_l)
+
+        """
+        images = torch.from_numpy(patches).to(self._device)
+        images = images[:, None] if images.ndim == 3 else images.permute(0, 3, 1, 2)
+        margin = (self._network.margin,) * 4
+        extended = torch.nn.functional.pad(images, margin, mode='replicate')
+        maps = dict(zip(self._layers, self._network(extended, self._layers), strict=True))
+        return {name: self._cells(maps[layer], layer, cell)
+                for name, (layer, cell) in zip(self._names, self._requests, strict=True)}
+
+    def _cells(self, maps: torch.Tensor, layer: str, cell: int) -> Array:
+        """Return the middle of a map, averaged over cells, channels last."""
+        stride = self._network.layers[layer].stride
+        maps = _middle(maps, self._size // cell * cell // stride)
+        if cell > stride:
+            maps = torch.nn.functional.avg_pool2d(maps, cell // stride)
+        channels = maps.permute(0, 2, 3, 1).contiguous()
+        return channels.numpy() if self._device.type == 'cpu' else channels
+
+
+def _check_kind(network: Backbone, kind: str) -> None:
+    """Refuse a network that looks at something else."""
+    expected = _INPUT_CHANNELS[kind]
+    if network.input_channels != expected:
+        raise ConfigError(
+            f'NetworkConfig.{kind}_backbone names a {type(network).__name__}, which takes '
+            f'{network.input_channels} channels; expected a network of {expected}: '
+            + ('intensities' if kind == 'appearance' else 'flow images'))
+
+
+def _check_cell(network: Backbone, layer: str, cell: int) -> None:
+    """Refuse cells that would cut those of the layer."""
+    stride = network.layers[layer].stride
+    if cell % stride:
+        raise ConfigError(f'FeatureConfig.cell is {cell}, but layer {layer} of '
+                          f'{type(network).__name__} has cells of {stride} pixels; '
+                          f'expected a multiple of {stride}')
+
+
+def _middle(maps: torch.Tensor, count: int) -> torch.Tensor:
+    """Return the `count` by `count` cells in the middle."""
+    top, left = ((length - count) // 2 for length in maps.shape[2:])
+    return maps[:, :, top:top + count, left:left + count]
