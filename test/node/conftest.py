@@ -83,11 +83,12 @@ class FakeTracker:
 class Graph:
     """One context with one executor and a node that plays camera and user."""
 
-    def __init__(self):
+    def __init__(self, namespace='/'):
         self.context = Context()
         self.context.init()
         self.executor = SingleThreadedExecutor(context=self.context)
-        self.user = Node('user', context=self.context)
+        self.namespace = namespace
+        self.user = Node('user', context=self.context, namespace=namespace)
         self.executor.add_node(self.user)
         self.fake = FakeTracker()
         self.received = {}
@@ -98,7 +99,8 @@ class Graph:
         """Start the node under test with the fake tracker unless another is given."""
         factory = values.pop('tracker_factory', lambda settings: self.fake)
         node = TrackerNode(
-            context=self.context, tracker_factory=factory, cli_args=values.pop('cli_args', None),
+            context=self.context, namespace=self.namespace, tracker_factory=factory,
+            cli_args=values.pop('cli_args', None),
             parameter_overrides=[Parameter(name, value=value) for name, value in values.items()])
         self.executor.add_node(node)
         self.trackers.append(node)
@@ -159,6 +161,18 @@ class Graph:
 def graph():
     """Return a graph of its own for each test."""
     graph = Graph()
+    yield graph
+    graph.close()
+
+
+@pytest.fixture
+def own_graph(request):
+    """
+    Return a graph with names that no other test uses.
+
+    The middleware believes in the subscriptions of a killed process for a while.
+    """
+    graph = Graph(f'/{request.node.name}')
     yield graph
     graph.close()
 
