@@ -194,7 +194,8 @@ def instrumented(clock: StageClock, recorder: CallRecorder | None = None,
     with contextlib.ExitStack() as changes:
         for stage in stages:
             try:
-                _replace(changes, *stage.place(), functools.partial(clock.wrap, _named(stage.name)))
+                _replace(changes, *stage.place(),
+                         functools.partial(clock.wrap, _named(stage.name)))
             except LookupError as error:
                 missing.append(str(error))
         if recorder is not None:

@@ -99,9 +99,7 @@ class NetworkChannels:
         """Return the middle of a map, averaged over cells, channels last."""
         stride = self._network.layers[layer].stride
         maps = _middle(maps, self._size // cell * cell // stride)
-        if cell > stride:
-            maps = torch.nn.functional.avg_pool2d(maps, cell // stride)
-        channels = maps.permute(0, 2, 3, 1).contiguous()
+        channels = _average(maps.permute(0, 2, 3, 1), cell // stride).contiguous()
         return channels.numpy() if self._device.type == 'cpu' else channels
 
 
@@ -128,3 +126,14 @@ def _middle(maps: torch.Tensor, count: int) -> torch.Tensor:
     """Return the `count` by `count` cells in the middle."""
     top, left = ((length - count) // 2 for length in maps.shape[2:])
     return maps[:, :, top:top + count, left:left + count]
+
+
+def _average(maps: torch.Tensor, side: int) -> torch.Tensor:
+    """Return the means of squares of `side` by `side` cells, (n, H, W, C); reads them once."""
+    parts = [maps[:, row::side, column::side] for row in range(side) for column in range(side)]
+    if side == 1:
+        return maps
+    total = parts[0] + parts[1]
+    for part in parts[2:]:
+        total += part
+    return total.div_(side**2)
