@@ -91,6 +91,7 @@ STAGES = (
     Stage('sharpness', 'track', 'peak_to_sidelobe_ratio'),
     Stage('scale', 'scale', 'ScaleFilter.estimate'),
     Stage('scale training', 'scale', 'ScaleFilter.learn'),
+    Stage('registration', 'registration', 'Registration.__call__'),
     Stage('sample', 'track', 'Detection.recentered_sample'),
     Stage('memory', 'learning.structured_operator', 'StructuredOperator.remember'),
     Stage(TRAINING, 'learning.structured_operator', 'StructuredOperator.train'),
@@ -164,8 +165,13 @@ class CallRecorder:
 
     def replay(self, kind: str, spent: Callable[[Callable[[], Any]], float]) -> float:
         """Make the remembered calls of a kind again, twice; return the sum of the faster times."""
-        with torch.inference_mode():
-            return sum(min(spent(call), spent(call)) for name, call in self.calls if name == kind)
+        self._depth += 1
+        try:
+            with torch.inference_mode():
+                return sum(min(spent(call), spent(call))
+                           for name, call in self.calls if name == kind)
+        finally:
+            self._depth -= 1
 
 
 @contextlib.contextmanager
