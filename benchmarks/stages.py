@@ -80,19 +80,19 @@ class Stage:
 
 # A stage counts its own time only: a patch taken for the scale belongs to `patch`.
 STAGES = (
-    Stage('gain', 'intensity', 'AutomaticGain.observe'),
+    Stage('gain', 'intensity', 'AutomaticGain.examine'),
     Stage('patch', 'sampling', 'FrameView.patch'),
     Stage('motion', 'features.motion', 'MotionObserver.images'),
     Stage('optical flow', 'features.optical_flow', 'DenseFlow.__call__'),
     Stage('network in and out', 'features.network_channels', 'NetworkChannels.__call__'),
     Stage('features', 'features.extractor', 'FeatureExtractor.__call__'),
     Stage('scores', 'learning.structured_operator', 'StructuredOperator.scores'),
-    Stage('peak', 'track', 'locate'),
-    Stage('sharpness', 'track', 'peak_to_sidelobe_ratio'),
+    Stage('peak', 'detection', 'locate'),
+    Stage('sharpness', 'detection', 'peak_to_sidelobe_ratio'),
     Stage('scale', 'scale', 'ScaleFilter.estimate'),
     Stage('scale training', 'scale', 'ScaleFilter.learn'),
     Stage('registration', 'registration', 'Registration.__call__'),
-    Stage('sample', 'track', 'Detection.recentered_sample'),
+    Stage('sample', 'detection', 'Detection.recentered_sample'),
     Stage('memory', 'learning.structured_operator', 'StructuredOperator.remember'),
     Stage(TRAINING, 'learning.structured_operator', 'StructuredOperator.train'),
 )

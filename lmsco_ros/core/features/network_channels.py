@@ -50,7 +50,8 @@ class NetworkChannels:
     Raises
     ------
     ConfigError
-        When the network is of the other kind or lacks a layer, or a cell does not consist of whole cells of the layer.
+        When the network is of the other kind or lacks a layer, or a cell does not consist of
+        whole cells of the layer.
 
     """
 
@@ -97,9 +98,11 @@ class NetworkChannels:
 
     def _cells(self, maps: torch.Tensor, layer: str, cell: int) -> Array:
         """Return the middle of a map, averaged over cells, channels last."""
-        stride = self._network.layers[layer].stride
-        maps = _middle(maps, self._size // cell * cell // stride)
-        channels = _average(maps.permute(0, 2, 3, 1), cell // stride).contiguous()
+        found = self._network.layers[layer]
+        first = found.first_cell(self._network.margin)
+        inside = slice(first, first + self._size // cell * cell // found.stride)
+        rows = maps[:, :, inside, inside].permute(0, 2, 3, 1)
+        channels = _average(rows, cell // found.stride).contiguous()
         return channels.numpy() if self._device.type == 'cpu' else channels
 
 
@@ -120,12 +123,6 @@ def _check_cell(network: Backbone, layer: str, cell: int) -> None:
         raise ConfigError(f'FeatureConfig.cell is {cell}, but layer {layer} of '
                           f'{type(network).__name__} has cells of {stride} pixels; '
                           f'expected a multiple of {stride}')
-
-
-def _middle(maps: torch.Tensor, count: int) -> torch.Tensor:
-    """Return the `count` by `count` cells in the middle."""
-    top, left = ((length - count) // 2 for length in maps.shape[2:])
-    return maps[:, :, top:top + count, left:left + count]
 
 
 def _average(maps: torch.Tensor, side: int) -> torch.Tensor:
