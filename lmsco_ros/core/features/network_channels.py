@@ -126,10 +126,10 @@ def _check_cell(network: Backbone, layer: str, cell: int) -> None:
 
 
 def _average(maps: torch.Tensor, side: int) -> torch.Tensor:
-    """Return the means of squares of `side` by `side` cells, (n, H, W, C); reads them once."""
-    parts = [maps[:, row::side, column::side] for row in range(side) for column in range(side)]
+    """Return the means of squares of `side` by `side` cells, shape (n, H, W, C)."""
     if side == 1:
         return maps
+    parts = [maps[:, row::side, column::side] for row in range(side) for column in range(side)]
     total = parts[0] + parts[1]
     for part in parts[2:]:
         total += part
