@@ -91,7 +91,7 @@ STAGES = (
     Stage('sharpness', 'detection', 'peak_to_sidelobe_ratio'),
     Stage('scale', 'scale', 'ScaleFilter.estimate'),
     Stage('scale training', 'scale', 'ScaleFilter.learn'),
-    Stage('registration', 'registration', 'Registration.__call__'),
+    Stage('verification', 'verification', 'Verification.__call__'),
     Stage('sample', 'detection', 'Detection.recentered_sample'),
     Stage('memory', 'learning.structured_operator', 'StructuredOperator.remember'),
     Stage(TRAINING, 'learning.structured_operator', 'StructuredOperator.train'),

@@ -28,7 +28,7 @@ from lmsco_ros.core.types import BoundingBox
 from training.degradations import degrade, occlude
 from training.sources import Clip, Still
 
-__all__ = ['Example', 'ExampleSource', 'Spread', 'jitter', 'offset_of']
+__all__ = ['Example', 'ExampleSource', 'flip', 'jitter', 'moved', 'offset_of', 'Spread']
 
 Array = npt.NDArray[np.float32]
 
@@ -159,7 +159,7 @@ class ExampleSource:
         still = self._stills[rng.integers(len(self._stills))]
         box = still.pick(rng)
         view = still.view()
-        return [(view, box)] + [_moved(view, box, rng) for _ in range(count - 1)]
+        return [(view, box)] + [moved(view, box, rng) for _ in range(count - 1)]
 
 
 def jitter(box: BoundingBox, spread: Spread, rng: np.random.Generator) -> BoundingBox:
@@ -181,8 +181,8 @@ def offset_of(box: BoundingBox, guess: BoundingBox,
             float(np.log(box.width / guess.width)), float(np.log(box.height / guess.height)))
 
 
-def _moved(view: FrameView, box: BoundingBox,
-           rng: np.random.Generator) -> tuple[FrameView, BoundingBox]:
+def moved(view: FrameView, box: BoundingBox,
+          rng: np.random.Generator) -> tuple[FrameView, BoundingBox]:
     """Return the image turned a little around the target and stretched, with the new box."""
     turn = np.deg2rad(rng.normal(0, 4))
     stretch = np.exp(rng.normal(0, 0.15) + rng.normal(0, 0.06, 2))
@@ -204,3 +204,12 @@ def _flip(example: Example, rng: np.random.Generator) -> Example:
     if rng.random() < 0.5:
         patches, offsets[:, 1] = patches[:, ::-1], -offsets[:, 1]
     return Example(np.ascontiguousarray(patches), offsets)
+
+
+def flip(patches: Array, rng: np.random.Generator) -> Array:
+    """Return patches (n, S, S), or one of their mirror images, warm and cold as chance has it."""
+    if rng.random() < 0.5:
+        patches = patches[:, :, ::-1]
+    if rng.random() < 0.5:
+        patches = patches[:, ::-1]
+    return np.ascontiguousarray(1 - patches if rng.random() < 0.5 else patches)

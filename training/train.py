@@ -17,7 +17,7 @@ Train one of the bundled networks.
 
     python -m training.train NETWORK --data DATA [--output FOLDER] [--minutes N] [--device NAME]
 
-NETWORK is thermal, thermal_flow or registration; DATA holds `thermal_dev` and
+NETWORK is thermal, thermal_flow or verification; DATA holds `thermal_dev` and
 `training_stills`. Written are NETWORK.safetensors, NETWORK_log.csv and NETWORK_curve.png.
 """
 
@@ -34,26 +34,27 @@ from matplotlib.figure import Figure
 import torch
 import yaml
 
-from lmsco_ros.core.backbones.registration import RegistrationNet
 from lmsco_ros.core.backbones.thermal import ThermalFlowNet, ThermalNet
+from lmsco_ros.core.backbones.verification import VerificationNet
 from training.correlation_filter import CorrelationFilter
 from training.examples import ExampleSource, Spread
 from training.features import feature_batches, FeatureObjective
 from training.flow_examples import FlowSource
 from training.loop import Batch, Objective, Schedule, take, train
-from training.registration import registration_batches, RegistrationObjective
+from training.pairs import PairSource
 from training.sources import Clip, load_clips, load_stills, Still
+from training.verification import verification_batches, VerificationObjective
 
 CONFIG = Path(__file__).with_name('config.yaml')
 
-Source = ExampleSource | FlowSource
+Source = ExampleSource | FlowSource | PairSource
 Batches = Callable[[Source, int], Iterator[Batch]]
 
 
 def main() -> None:
     """Train the network that the command line names."""
     parser = argparse.ArgumentParser(description=__doc__.split('\n\n')[0])
-    parser.add_argument('network', choices=('thermal', 'thermal_flow', 'registration'))
+    parser.add_argument('network', choices=('thermal', 'thermal_flow', 'verification'))
     parser.add_argument('--data', type=Path, required=True)
     parser.add_argument('--output', type=Path, default=Path('training/output'))
     parser.add_argument('--minutes', type=float)
@@ -102,8 +103,8 @@ def _parts(name: str, settings: Mapping[str, Any]) -> tuple[
         torch.nn.Module, Objective, Batches,
         Callable[[Sequence[Clip], Sequence[Still]], Source]]:
     """Return network, objective, batches of a source, and source of clips and stills."""
-    if name == 'registration':
-        return _registration(settings)
+    if name == 'verification':
+        return _verification(settings)
     correlation = CorrelationFilter(**settings['filter'])
     objective = FeatureObjective(correlation, settings['layer'], settings['core'])
     searched = Spread(**settings['searched'])
@@ -119,20 +120,19 @@ def _parts(name: str, settings: Mapping[str, Any]) -> tuple[
         clips, stills, size, factor, True, settings['clip_share'])
 
 
-def _registration(settings: Mapping[str, Any]) -> tuple[
+def _verification(settings: Mapping[str, Any]) -> tuple[
         torch.nn.Module, Objective, Batches,
         Callable[[Sequence[Clip], Sequence[Still]], Source]]:
-    """Return the parts of `_parts` for the registration network."""
-    network = RegistrationNet()
-    present, absent = Spread(**settings['present']), Spread(**settings['absent'])
+    """Return the parts of `_parts` for the verification network."""
+    network = VerificationNet()
+    present = Spread(**settings['present'])
 
     def batches(source: Source, seed: int) -> Iterator[Batch]:
-        return registration_batches(source, settings['batch_size'], present, absent,
-                                    settings['absent_share'], seed)
+        return verification_batches(source, settings['batch_size'], settings['shares'], seed)
 
-    objective = RegistrationObjective(settings['tolerance'], settings['presence_weight'])
-    return network, objective, batches, lambda clips, stills: ExampleSource(
-        clips, stills, network.size, network.context, False, settings['clip_share'])
+    return network, VerificationObjective(), batches, lambda clips, stills: PairSource(
+        clips, stills, network.size, network.context, settings['clip_share'], present,
+        tuple(settings['near']))
 
 
 def draw_curve(log: Path, picture: Path) -> None:

@@ -27,13 +27,13 @@ import yaml
 from lmsco_ros.core.errors import ConfigError
 from lmsco_ros.core.sections import (
     ChannelConfig, ConfidenceConfig, FeatureConfig, IntensityConfig, LearningConfig, MotionConfig,
-    NetworkConfig, RegistrationConfig, RuntimeConfig, SamplingConfig, ScaleConfig)
+    NetworkConfig, RuntimeConfig, SamplingConfig, ScaleConfig, VerificationConfig)
 from lmsco_ros.core.validation import build, check_range
 
 __all__ = [
     'ChannelConfig', 'ConfidenceConfig', 'FeatureConfig', 'IntensityConfig', 'LearningConfig',
-    'MotionConfig', 'NetworkConfig', 'RegistrationConfig', 'RuntimeConfig', 'SamplingConfig',
-    'ScaleConfig', 'TrackerConfig',
+    'MotionConfig', 'NetworkConfig', 'RuntimeConfig', 'SamplingConfig', 'ScaleConfig',
+    'TrackerConfig', 'VerificationConfig',
 ]
 
 _FEWEST_CELLS = 5
@@ -51,7 +51,7 @@ class TrackerConfig:
     ----------
     features : tuple of FeatureConfig
         Feature blocks.
-    intensity, sampling, networks, motion, learning, scale, registration, confidence,
+    intensity, sampling, networks, motion, learning, scale, verification, confidence,
     runtime
         Sections, described in their classes.
     newton_steps : int
@@ -71,7 +71,7 @@ class TrackerConfig:
     motion: MotionConfig = MotionConfig()
     learning: LearningConfig = LearningConfig()
     scale: ScaleConfig = ScaleConfig()
-    registration: RegistrationConfig = RegistrationConfig()
+    verification: VerificationConfig = VerificationConfig()
     confidence: ConfidenceConfig = ConfidenceConfig()
     runtime: RuntimeConfig = RuntimeConfig()
     newton_steps: int = 5

@@ -25,7 +25,7 @@ from lmsco_ros.core.sections import NETWORK_KINDS
 
 if TYPE_CHECKING:
     from lmsco_ros.core.backbones.backbone import Backbone
-    from lmsco_ros.core.backbones.registration import RegistrationNet
+    from lmsco_ros.core.backbones.verification import VerificationNet
 
 __all__ = ['load_networks', 'Networks']
 
@@ -39,14 +39,14 @@ class Networks:
     ----------
     appearance, motion : Backbone or None
         Behind the feature channels of that kind.
-    registration : RegistrationNet or None
+    verification : VerificationNet or None
         Compares the target with its first frame.
 
     """
 
     appearance: Backbone | None = None
     motion: Backbone | None = None
-    registration: RegistrationNet | None = None
+    verification: VerificationNet | None = None
 
 
 def load_networks(config: TrackerConfig) -> Networks:
@@ -63,8 +63,8 @@ def load_networks(config: TrackerConfig) -> Networks:
               'motion': config.networks.motion_backbone}
     used = {group.kind for block in config.features for group in block.channels}
     names = {kind: wanted[kind] for kind in NETWORK_KINDS if kind in used}
-    if config.registration.backbone:
-        names['registration'] = config.registration.backbone
+    if config.verification.backbone:
+        names['verification'] = config.verification.backbone
     if not names:
         return Networks()
     from lmsco_ros.core.backbones.weights import load_backbone
@@ -72,4 +72,4 @@ def load_networks(config: TrackerConfig) -> Networks:
     folder = Path(config.networks.directory) if config.networks.directory else None
     found = {kind: load_backbone(name, folder) for kind, name in names.items()}
     return Networks(found.get('appearance'), found.get('motion'),
-                    cast('RegistrationNet | None', found.get('registration')))
+                    cast('VerificationNet | None', found.get('verification')))

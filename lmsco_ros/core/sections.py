@@ -23,8 +23,8 @@ from lmsco_ros.core.validation import check_choice, check_range
 
 __all__ = [
     'ChannelConfig', 'ConfidenceConfig', 'FeatureConfig', 'IntensityConfig', 'LearningConfig',
-    'MotionConfig', 'NETWORK_KINDS', 'NetworkConfig', 'RegistrationConfig', 'RuntimeConfig',
-    'SamplingConfig', 'ScaleConfig',
+    'MotionConfig', 'NETWORK_KINDS', 'NetworkConfig', 'RuntimeConfig', 'SamplingConfig',
+    'ScaleConfig', 'VerificationConfig',
 ]
 
 NETWORK_KINDS = ('appearance', 'motion')
@@ -314,31 +314,18 @@ class ScaleConfig:
 
 
 @dataclass(frozen=True)
-class RegistrationConfig:
+class VerificationConfig:
     """
-    Registration of the target to its first frame.
+    Comparison of what is found with the first frame.
 
     Attributes
     ----------
     backbone : str
-        Name of the weights of the network that compares; empty for no registration.
-    center_rate, size_rate : float
-        Part of the way that the box follows what the network says in one frame.
-    tolerance : float
-        Change of a side, as a logarithm, that is left to the scale estimator.
+        Name of the weights of the network that compares; empty for no comparison.
 
     """
 
     backbone: str = ''
-    center_rate: float = 0.5
-    size_rate: float = 0.5
-    tolerance: float = 0.15
-
-    def __post_init__(self) -> None:
-        """Check the ranges."""
-        check_range(self, 'center_rate', 0, 1)
-        check_range(self, 'size_rate', 0, 1)
-        check_range(self, 'tolerance', 0, 2)
 
 
 @dataclass(frozen=True)

@@ -25,10 +25,10 @@ from lmsco_ros.core.detection import Detection, Detector
 from lmsco_ros.core.fourier.localization import centered_map
 from lmsco_ros.core.intensity import AutomaticGain
 from lmsco_ros.core.networks import Networks
-from lmsco_ros.core.registration import Registration
 from lmsco_ros.core.sampling import check_box, clamp_box, FrameView, search_tiles
 from lmsco_ros.core.scale import make_scale_estimator
 from lmsco_ros.core.types import BoundingBox, TrackResult, TrackState
+from lmsco_ros.core.verification import Verification
 
 __all__ = ['Track']
 
@@ -73,9 +73,8 @@ class Track:
         self._detector = Detector(config, backend, networks, view, box)
         self._scale = make_scale_estimator(config.scale, box.size)
         self._scale.learn(view, box)
-        self._registration = Registration(
-            config.registration, networks.registration, view, box) if (
-            networks.registration is not None) else None
+        self._verification = None if networks.verification is None else Verification(
+            networks.verification, view, box)
         first = self._detector(view, box)
         self._first_peak = first.peak.value
         self._detector.watch(view, box)
@@ -108,9 +107,9 @@ class Track:
 
     def _weigh(self, view: FrameView, detection: Detection) -> Evidence:
         """Return what speaks for a detection."""
-        if self._registration is None:
+        if self._verification is None:
             return Evidence(detection.sharpness)
-        found = self._registration(view, self._box.moved_to(detection.center))
+        found = self._verification(view, self._box.moved_to(detection.center))
         return Evidence(detection.sharpness, found.presence)
 
     def _search_elsewhere(self, view: FrameView, here: Detection,
@@ -135,8 +134,6 @@ class Track:
         scale = self._scale.found_factor(detection.peak.scale_values)
         moved = clamp_box(self._box.moved_to(detection.center).scaled(scale), view.size)
         moved = moved.scaled(self._scale.estimate(view, moved))
-        if self._registration is not None:
-            moved = self._registration(view, moved).box
         self._box = clamp_box(moved, view.size)
 
     def _learn(self, view: FrameView, detection: Detection) -> None:

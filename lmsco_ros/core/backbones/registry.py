@@ -20,9 +20,9 @@ from dataclasses import dataclass
 
 from lmsco_ros.core.backbones.backbone import Backbone
 from lmsco_ros.core.backbones.motion_cnn import MotionCNN
-from lmsco_ros.core.backbones.registration import RegistrationNet
 from lmsco_ros.core.backbones.squeezenet import SqueezeNet
 from lmsco_ros.core.backbones.thermal import ThermalFlowNet, ThermalNet
+from lmsco_ros.core.backbones.verification import VerificationNet
 from lmsco_ros.core.backbones.vgg_m import VGGM
 from lmsco_ros.core.errors import WeightsError
 
@@ -84,11 +84,11 @@ WEIGHTS = (
         file_name='thermal_flow.safetensors',
         bundled=True),
     WeightsSource(
-        name='registration',
-        purpose='size, aspect and presence of a target against its first frame, trained here',
-        architecture=RegistrationNet,
+        name='verification',
+        purpose='whether a target of the first frame is there, trained here',
+        architecture=VerificationNet,
         license='Apache-2.0',
-        file_name='registration.safetensors',
+        file_name='verification.safetensors',
         bundled=True),
     WeightsSource(
         name='vgg_m_2048',

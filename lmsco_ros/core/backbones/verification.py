@@ -25,12 +25,12 @@ from torch import nn
 from lmsco_ros.core.backbones.backbone import Backbone, Layer
 from lmsco_ros.core.backbones.layers import standardize
 
-__all__ = ['RegistrationNet']
+__all__ = ['VerificationNet']
 
 
-class RegistrationNet(Backbone):
+class VerificationNet(Backbone):
     """
-    Where, how large, and whether at all a target of the first frame is in a patch.
+    Whether the target of the first frame is in a patch.
 
     Both patches show a box in the middle of a region `context` times as wide and as high, so
     that a box that fits looks like the first one whatever its size and aspect.
@@ -56,7 +56,7 @@ class RegistrationNet(Backbone):
         self.joint1 = nn.Conv2d(96, 64, 3, 1, 1)
         self.joint2 = nn.Conv2d(64, 64, 4, 2, 1)
         self.hidden = nn.Linear(1024, 64)
-        self.answer = nn.Linear(64, 5)
+        self.answer = nn.Linear(64, 1)
 
     def forward(self, images: torch.Tensor, layers: Sequence[str] = ('encoding',)
                 ) -> list[torch.Tensor]:
@@ -71,13 +71,13 @@ class RegistrationNet(Backbone):
         return self(torch.from_numpy(patch)[None, None].to(self.answer.weight.device))[0]
 
     @torch.inference_mode()
-    def relate(self, first: torch.Tensor, now: torch.Tensor) -> np.ndarray:
-        """Return the answer of `compare` for one pair of encodings, shape (5,)."""
-        return self.compare(first, now)[0].cpu().numpy()
+    def relate(self, first: torch.Tensor, now: torch.Tensor) -> float:
+        """Return the answer of `compare` for one pair of encodings."""
+        return float(self.compare(first, now)[0])
 
     def compare(self, first: torch.Tensor, now: torch.Tensor) -> torch.Tensor:
         """
-        Return where the target is in relation to the box that a patch was laid around.
+        Return the log-odds that the second patch shows the target.
 
         Parameters
         ----------
@@ -86,11 +86,10 @@ class RegistrationNet(Backbone):
 
         Returns
         -------
-        tensor, shape (n, 5)
-            Displacement (x, y) of the center in sizes of the box, logarithms of the factors of
-            width and height, and the log-odds that the target is there.
+        tensor, shape (n,)
+            Log-odds.
 
         """
         maps = torch.relu_(self.joint1(torch.cat([first, now], dim=1)))
         maps = torch.relu_(self.joint2(maps))
-        return self.answer(torch.relu_(self.hidden(maps.flatten(1))))
+        return self.answer(torch.relu_(self.hidden(maps.flatten(1))))[:, 0]
