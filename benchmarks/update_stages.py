@@ -37,6 +37,7 @@ import numpy as np
 from lmsco_ros.core import BoundingBox, LMSCOTracker, TrackerConfig
 from lmsco_ros.core import track
 from lmsco_ros.core.features.extractor import FeatureExtractor
+from lmsco_ros.core.features.motion import MotionObserver
 from lmsco_ros.core.intensity import AutomaticGain
 from lmsco_ros.core.learning.structured_operator import StructuredOperator
 from lmsco_ros.core.sampling import FrameView
@@ -48,6 +49,7 @@ from lmsco_ros.synthetic import render_scene, SceneConfig
 STAGES = (
     ('gain', AutomaticGain, 'observe'),
     ('patch', FrameView, 'patch'),
+    ('motion', MotionObserver, 'images'),
     ('features', FeatureExtractor, '__call__'),
     ('scores', StructuredOperator, 'scores'),
     ('peak', track, 'locate'),
@@ -119,7 +121,7 @@ def measure(preset: str, frames: Sequence[np.ndarray], box: BoundingBox,
 def main() -> None:
     """Print the table."""
     parser = argparse.ArgumentParser(description=__doc__.split('\n\n')[0])
-    parser.add_argument('--preset', default='hcs')
+    parser.add_argument('--preset', default='default')
     parser.add_argument('--frames', type=int, default=150)
     parser.add_argument('--repetitions', type=int, default=3)
     options = parser.parse_args()
