@@ -50,18 +50,17 @@ class NetworkChannels:
     Raises
     ------
     ConfigError
-        When the network is of the other kind or lacks a layer, or a cell does not consist of whole cells of the layer.
+        When the network is of the other kind or lacks a layer, or a cell does not consist of
+        whole cells of the layer.
 
     """
 
     def __init__(self, network: Backbone, kind: str, requests: Iterable[tuple[str, int]],
                  size: int, backend: Backend) -> None:
         _check_kind(network, kind)
-        self._requests = [(network.layer_name(layer), cell)
-                          for layer, cell in dict.fromkeys(requests)]
-        self._layers = tuple(dict.fromkeys(layer for layer, _ in self._requests))
-        self._names = list(dict.fromkeys(requests))
-        for layer, cell in self._requests:
+        self._requests = {(name, cell): network.layer_name(name) for name, cell in requests}
+        self._layers = tuple(dict.fromkeys(self._requests.values()))
+        for (_, cell), layer in self._requests.items():
             _check_cell(network, layer, cell)
         self._backend = backend
         self._device = torch.device(backend.device)
@@ -92,13 +91,15 @@ class NetworkChannels:
         margin = (self._network.margin,) * 4
         extended = torch.nn.functional.pad(images, margin, mode='replicate')
         maps = dict(zip(self._layers, self._network(extended, self._layers), strict=True))
-        return {name: self._cells(maps[layer], layer, cell)
-                for name, (layer, cell) in zip(self._names, self._requests, strict=True)}
+        return {(name, cell): self._cells(maps[layer], layer, cell)
+                for (name, cell), layer in self._requests.items()}
 
     def _cells(self, maps: torch.Tensor, layer: str, cell: int) -> Array:
-        """Return the middle of a map, averaged over cells, channels last."""
+        """Return what a map shows of the patch itself, averaged over cells, channels last."""
         stride = self._network.layers[layer].stride
-        maps = _middle(maps, self._size // cell * cell // stride)
+        first = round((self._network.margin - self._network.layers[layer].offset) / stride)
+        shown = slice(first, first + self._size // stride)
+        maps = maps[:, :, shown, shown]
         if cell > stride:
             maps = torch.nn.functional.avg_pool2d(maps, cell // stride)
         channels = maps.permute(0, 2, 3, 1).contiguous()
@@ -122,9 +123,3 @@ def _check_cell(network: Backbone, layer: str, cell: int) -> None:
         raise ConfigError(f'FeatureConfig.cell is {cell}, but layer {layer} of '
                           f'{type(network).__name__} has cells of {stride} pixels; '
                           f'expected a multiple of {stride}')
-
-
-def _middle(maps: torch.Tensor, count: int) -> torch.Tensor:
-    """Return the `count` by `count` cells in the middle."""
-    top, left = ((length - count) // 2 for length in maps.shape[2:])
-    return maps[:, :, top:top + count, left:left + count]
