@@ -44,7 +44,7 @@ setup(
         'numpy>=1.26,<3',
         'opencv-python-headless>=4.9,<6',
         'platformdirs>=4,<5',
-        'protobuf>=4.21,<8',
+        'protobuf>=4.22,<8',
         'pyyaml>=5.4,<7',
         'requests>=2.28,<3',
         'rich>=12,<16',

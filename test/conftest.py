@@ -12,11 +12,13 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What every test may rely on: a private ROS graph, test data, reproducible properties."""
+"""What every test may rely on: a private ROS graph, data, servers, reproducible properties."""
 
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 import os
 from pathlib import Path
 import re
+import threading
 import zlib
 
 from hypothesis import HealthCheck, settings
@@ -75,3 +77,86 @@ def test_data() -> Path:
     if not root.is_dir():
         pytest.skip(f'no thermal sequences in {root}; set LMSCO_TEST_DATA to their folder')
     return root
+
+
+class FileServer:
+    """
+    A server on this machine that gives one file to whoever asks, well or badly.
+
+    Attributes
+    ----------
+    content : bytes
+        The file.
+    tag : str or None
+        What it calls this version of the file.
+    ranges : bool
+        Whether it heeds requests for a part.
+    cuts : list of int
+        Numbers of bytes after which the next connections break.
+    asked : list of str or None
+        Parts that were asked for so far; None for all.
+
+    """
+
+    def __init__(self):
+        self.content, self.tag, self.ranges = b'', '"1"', True
+        self.cuts, self.asked = [], []
+        files = self
+
+        class Handler(BaseHTTPRequestHandler):
+            def do_GET(self):  # noqa: N802
+                files.answer(self)
+
+            def log_message(self, *arguments):
+                pass
+
+        self._server = ThreadingHTTPServer(('127.0.0.1', 0), Handler)
+        self._thread = threading.Thread(target=self._server.serve_forever, args=(0.01,))
+        self._thread.start()
+
+    def url(self, name):
+        """Return the address of the file; the name `missing` is not there."""
+        return f'http://127.0.0.1:{self._server.server_port}/{name}'
+
+    def answer(self, request):
+        """Send what is asked for, as far as the connection holds."""
+        wanted = request.headers.get('Range')
+        self.asked.append(wanted)
+        start = int(re.match(r'bytes=(\d+)-', wanted)[1]) if wanted and self.ranges else 0
+        if request.headers.get('If-Range') != self.tag:
+            start = 0
+        if request.path == '/missing':
+            request.send_error(404)
+        elif start and start >= len(self.content):
+            request.send_error(416)
+        else:
+            self._send(request, start)
+
+    def _send(self, request, start):
+        """Send the file from `start` on."""
+        request.send_response(206 if start else 200)
+        if start:
+            end = len(self.content)
+            request.send_header('Content-Range', f'bytes {start}-{end - 1}/{end}')
+        if self.tag:
+            request.send_header('ETag', self.tag)
+        request.send_header('Content-Length', str(len(self.content) - start))
+        request.end_headers()
+        length = self.cuts.pop(0) if self.cuts else None
+        request.wfile.write(self.content[start:][:length])
+        request.close_connection = True
+
+    def close(self):
+        """Stop listening."""
+        self._server.shutdown()
+        self._thread.join()
+        self._server.server_close()
+
+
+@pytest.fixture
+def file_server(monkeypatch):
+    """Return a server whose file may be asked for directly, whatever proxies are set."""
+    monkeypatch.setenv('NO_PROXY', '127.0.0.1')
+    server = FileServer()
+    yield server
+    server.close()

@@ -28,7 +28,7 @@ from lmsco_ros.core.types import BoundingBox
 from training.degradations import degrade, occlude
 from training.sources import Clip, Still
 
-__all__ = ['Example', 'ExampleSource', 'Spread']
+__all__ = ['Example', 'ExampleSource', 'Spread', 'jitter', 'offset_of']
 
 Array = npt.NDArray[np.float32]
 
@@ -122,13 +122,13 @@ class ExampleSource:
         patches, offsets = [], []
         for i, (view, box) in enumerate(sights):
             last = i == count - 1
-            guess = _jitter(box, searched if last else known, rng)
+            guess = jitter(box, searched if last else known, rng)
             patch = self._patch(view, guess)
             if last and rng.random() < 0.1:
                 patch = occlude(patch, self._size / self._factor, rng)
             patch = degrade(patch, rng)
             patches.append(1 - patch if inverted else patch)
-            offsets.append(self._offset(box, guess))
+            offsets.append(offset_of(box, guess, self._sides(guess)))
         return _flip(Example(np.stack(patches), np.array(offsets, np.float32)), rng)
 
     def _patch(self, view: FrameView, box: BoundingBox) -> Array:
@@ -141,13 +141,6 @@ class ExampleSource:
     def _sides(self, box: BoundingBox) -> tuple[float, float]:
         """Return the sides of the region around a box, over the factor."""
         return (box.area**0.5,) * 2 if self._square else box.size
-
-    def _offset(self, box: BoundingBox, guess: BoundingBox) -> tuple[float, float, float, float]:
-        """Return where a box is in the region around the guess, and its size."""
-        width, height = self._sides(guess)
-        return ((box.center[0] - guess.center[0]) / width,
-                (box.center[1] - guess.center[1]) / height,
-                float(np.log(box.width / guess.width)), float(np.log(box.height / guess.height)))
 
     def _from_clip(self, count: int,
                    rng: np.random.Generator) -> list[tuple[FrameView, BoundingBox]]:
@@ -169,7 +162,7 @@ class ExampleSource:
         return [(view, box)] + [_moved(view, box, rng) for _ in range(count - 1)]
 
 
-def _jitter(box: BoundingBox, spread: Spread, rng: np.random.Generator) -> BoundingBox:
+def jitter(box: BoundingBox, spread: Spread, rng: np.random.Generator) -> BoundingBox:
     """Return a box that is a bit off."""
     side = box.area**0.5
     shift = rng.uniform(-spread.shift, spread.shift, 2) * side
@@ -178,6 +171,14 @@ def _jitter(box: BoundingBox, spread: Spread, rng: np.random.Generator) -> Bound
     center = (box.center[0] + shift[0], box.center[1] + shift[1])
     return BoundingBox.from_center(
         center, (box.width * scale * stretch, box.height * scale / stretch))
+
+
+def offset_of(box: BoundingBox, guess: BoundingBox,
+              sides: tuple[float, float]) -> tuple[float, float, float, float]:
+    """Return where a box is from the guess, in `sides`, and its size over that of the guess."""
+    return ((box.center[0] - guess.center[0]) / sides[0],
+            (box.center[1] - guess.center[1]) / sides[1],
+            float(np.log(box.width / guess.width)), float(np.log(box.height / guess.height)))
 
 
 def _moved(view: FrameView, box: BoundingBox,

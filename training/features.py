@@ -16,7 +16,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -25,6 +25,7 @@ import torch
 from lmsco_ros.core.backbones.backbone import Backbone
 from training.correlation_filter import CorrelationFilter, margin_loss
 from training.examples import ExampleSource, Spread
+from training.flow_examples import FlowSource
 from training.loop import Batch
 
 __all__ = ['FeatureObjective', 'feature_batches']
@@ -74,14 +75,14 @@ class FeatureObjective:
         return float((gap <= 1).float().mean())
 
 
-def feature_batches(source: ExampleSource, size: int, views: int, spread: Spread,
-                    seeds: Sequence[int]) -> Iterator[Batch]:
+def feature_batches(source: ExampleSource | FlowSource, size: int, views: int, spread: Spread,
+                    seed: int) -> Iterator[Batch]:
     """
     Yield batches of `size` examples without end.
 
     Parameters
     ----------
-    source : ExampleSource
+    source : ExampleSource or FlowSource
         Examples.
     size : int
         Examples in a batch.
@@ -89,14 +90,14 @@ def feature_batches(source: ExampleSource, size: int, views: int, spread: Spread
         Regions of an example: all but the last train the filter.
     spread : Spread
         How far the last region is off its target.
-    seeds : sequence of int
+    seed : int
         Seed of the random numbers.
 
     """
-    rng = np.random.default_rng(seeds)
+    rng = np.random.default_rng(seed)
     training = Spread(0.0, 0.0, 0.0)
     while True:
         examples = [source.draw(views, training, spread, rng) for _ in range(size)]
-        inputs = np.stack([example.patches for example in examples])
-        targets = np.stack([example.offsets for example in examples])
-        yield Batch(torch.from_numpy(inputs[:, :, None]), torch.from_numpy(targets))
+        inputs = torch.from_numpy(np.stack([example.patches for example in examples]))
+        targets = torch.from_numpy(np.stack([example.offsets for example in examples]))
+        yield Batch(inputs.unsqueeze(2) if inputs.ndim == 4 else inputs.movedim(-1, 2), targets)

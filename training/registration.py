@@ -16,7 +16,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -79,7 +79,7 @@ def _overlap(left: torch.Tensor, right: torch.Tensor) -> torch.Tensor:
 
 
 def registration_batches(source: ExampleSource, size: int, near: Spread, far: Spread,
-                         absent_share: float, seeds: Sequence[int]) -> Iterator[Batch]:
+                         absent_share: float, seed: int) -> Iterator[Batch]:
     """
     Yield batches of `size` examples without end.
 
@@ -94,11 +94,11 @@ def registration_batches(source: ExampleSource, size: int, near: Spread, far: Sp
         where the patch shows what is around it.
     absent_share : float
         Share of the examples with an absent target.
-    seeds : sequence of int
+    seed : int
         Seed of the random numbers.
 
     """
-    rng = np.random.default_rng(seeds)
+    rng = np.random.default_rng(seed)
     exact = Spread(0.0, 0.0, 0.0)
     while True:
         absent = rng.random(size) < absent_share

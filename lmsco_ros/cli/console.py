@@ -16,14 +16,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from typing import NoReturn
 
 from rich.console import Console
 from rich.markup import escape
 from rich.progress import (
-    BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn)
+    BarColumn, DownloadColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn,
+    TimeRemainingColumn, TransferSpeedColumn)
+from rich.table import Table
 import typer
 
 FAILED, MISUSED = 1, 2
@@ -65,6 +67,23 @@ def warn(message: str) -> None:
 def say(message: str) -> None:
     """Tell a result."""
     Console(soft_wrap=True).print(escape(message), highlight=False)
+
+
+def show_table(heads: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
+    """Show rows below their heads; the last column takes as many lines as it needs."""
+    table = Table(box=None, pad_edge=False)
+    for number, head in enumerate(heads):
+        table.add_column(head, no_wrap=number < len(heads) - 1)
+    for row in rows:
+        table.add_row(*map(escape, row))
+    Console().print(table)
+
+
+def byte_progress() -> Progress:
+    """Return a progress display that counts bytes, on standard error."""
+    return Progress(
+        TextColumn('{task.description:<12}'), BarColumn(), DownloadColumn(),
+        TransferSpeedColumn(), TimeRemainingColumn(), console=Console(stderr=True))
 
 
 def frame_progress() -> Progress:

@@ -71,14 +71,21 @@ def evaluate(
         min=1, help='Number of single-threaded processes.')] = 1,
     split: Annotated[Optional[Part], typer.Option(
         show_default=False, help='Only this part of the fixed split of thermal_dev.')] = None,
+    challenge: Annotated[Optional[list[str]], typer.Option(
+        show_default='the sequences as they are',
+        help='Make the sequences harder: disappear_1s, disappear_3s, leave, cut, twin, '
+             'twin_remains, shutter, gain_jump, polarity, dead_pixels, telemetry, nan, text, '
+             'sixteen_bit or all. May be repeated.')] = None,
 ) -> None:
     """Run trackers over a dataset and report accuracy, robustness and speed."""
+    from lmsco_ros.evaluation.challenges import challenge_names
     from lmsco_ros.evaluation.runner import Evaluation
     from lmsco_ros.evaluation.session import (
         build_trackers, buildable_trackers, describe, Request, select_sequences)
 
     with plain_errors():
-        request = Request(dataset, sequences, frames, split.value if split else None)
+        request = Request(dataset, sequences, frames, split.value if split else None,
+                          challenge_names(challenge or []))
         trackers, unavailable = (
             (build_trackers(tracker), ()) if tracker else buildable_trackers())
         for reason in unavailable:

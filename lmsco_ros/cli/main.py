@@ -18,7 +18,7 @@ from __future__ import annotations
 
 import typer
 
-from lmsco_ros.cli import demo, evaluate, make_bag, replay, track
+from lmsco_ros.cli import demo, evaluate, make_bag, replay, track, weights
 
 
 def build_app() -> typer.Typer:
@@ -26,7 +26,7 @@ def build_app() -> typer.Typer:
     app = typer.Typer(
         name='lmsco', no_args_is_help=True, add_completion=False,
         pretty_exceptions_enable=False, help='Follow targets in thermal video.')
-    for command in (track, replay, make_bag, demo, evaluate):
+    for command in (track, replay, make_bag, demo, evaluate, weights):
         command.register(app)
     return app
 

@@ -27,13 +27,13 @@ import yaml
 from lmsco_ros.core.errors import ConfigError
 from lmsco_ros.core.sections import (
     ChannelConfig, ConfidenceConfig, FeatureConfig, IntensityConfig, LearningConfig, MotionConfig,
-    NetworkConfig, RuntimeConfig, SamplingConfig, ScaleConfig)
+    NetworkConfig, RegistrationConfig, RuntimeConfig, SamplingConfig, ScaleConfig)
 from lmsco_ros.core.validation import build, check_range
 
 __all__ = [
     'ChannelConfig', 'ConfidenceConfig', 'FeatureConfig', 'IntensityConfig', 'LearningConfig',
-    'MotionConfig', 'NetworkConfig', 'RuntimeConfig', 'SamplingConfig', 'ScaleConfig',
-    'TrackerConfig',
+    'MotionConfig', 'NetworkConfig', 'RegistrationConfig', 'RuntimeConfig', 'SamplingConfig',
+    'ScaleConfig', 'TrackerConfig',
 ]
 
 _FEWEST_CELLS = 5
@@ -51,7 +51,8 @@ class TrackerConfig:
     ----------
     features : tuple of FeatureConfig
         Feature blocks.
-    intensity, sampling, networks, motion, learning, scale, confidence, runtime
+    intensity, sampling, networks, motion, learning, scale, registration, confidence,
+    runtime
         Sections, described in their classes.
     newton_steps : int
         Refinement of the score's maximum.
@@ -70,6 +71,7 @@ class TrackerConfig:
     motion: MotionConfig = MotionConfig()
     learning: LearningConfig = LearningConfig()
     scale: ScaleConfig = ScaleConfig()
+    registration: RegistrationConfig = RegistrationConfig()
     confidence: ConfidenceConfig = ConfidenceConfig()
     runtime: RuntimeConfig = RuntimeConfig()
     newton_steps: int = 5

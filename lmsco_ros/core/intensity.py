@@ -18,16 +18,20 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import cv2
 import numpy as np
 
 from lmsco_ros.core.config import IntensityConfig
 from lmsco_ros.core.errors import ImageError
+from lmsco_ros.core.probe import (
+    credible_values, is_frozen, percentiles, PolarityTracker, take_probe, to_gray)
 
-__all__ = ['AutomaticGain', 'IntensityRange', 'check_image', 'to_gray']
+__all__ = ['AutomaticGain', 'FrameCondition', 'IntensityRange', 'check_image', 'to_gray']
 
-_PROBE_POINTS = 8192
 _SMALLEST_SIDE = 8
+
+# Where most of a scene lies, and how many times that far away its pixels get suspicious.
+_MOST = (10.0, 90.0)
+_FAR = 4.0
 
 
 @dataclass(frozen=True)
@@ -38,7 +42,7 @@ class IntensityRange:
     Attributes
     ----------
     low, high : float
-        Counts; high > low.
+        Counts, not the same; low > high turns warm and cold around.
 
     """
 
@@ -49,6 +53,32 @@ class IntensityRange:
         """Return float32 counts in the working range, not clipped."""
         scale = np.float32(1 / (self.high - self.low))
         return (counts - np.float32(self.low)) * scale
+
+    def turned(self) -> IntensityRange:
+        """Return the range with warm and cold in each other's place."""
+        return IntensityRange(self.high, self.low)
+
+
+@dataclass(frozen=True)
+class FrameCondition:
+    """
+    What a frame is like before anything is looked for in it.
+
+    Attributes
+    ----------
+    intensity : IntensityRange
+        Working range; warm and cold are as in the first frame, whatever the polarity.
+    frozen : bool
+        Whether the frame is the one before once more, bit for bit: the shutter is closed for
+        a flat-field correction, or the source repeats itself. It shows nothing new.
+    inverted : bool
+        Whether the polarity (white hot, black hot) is not the one of the first frame.
+
+    """
+
+    intensity: IntensityRange
+    frozen: bool
+    inverted: bool
 
 
 def check_image(image: np.ndarray) -> None:
@@ -73,11 +103,6 @@ def check_image(image: np.ndarray) -> None:
                          f'expected at least {_SMALLEST_SIDE} in each direction')
 
 
-def to_gray(pixels: np.ndarray) -> np.ndarray:
-    """Return one channel; gray pixels pass through."""
-    return pixels if pixels.ndim == 2 else cv2.cvtColor(pixels, cv2.COLOR_BGR2GRAY)
-
-
 class AutomaticGain:
     """
     Follows the percentiles of the frames.
@@ -85,7 +110,7 @@ class AutomaticGain:
     Small changes are smoothed, so that a warm object at the border does not make the picture
     flicker; a change above `jump`, as a camera's own gain control makes it, is adopted at once.
     Both rules are relative to the range: a constant gain and offset of the camera change
-    nothing.
+    nothing, and neither does a switch of its polarity after the first frame.
 
     Parameters
     ----------
@@ -96,35 +121,70 @@ class AutomaticGain:
 
     def __init__(self, config: IntensityConfig) -> None:
         self._config = config
+        self._polarity = PolarityTracker()
+        self._probe: np.ndarray | None = None
         self._range: IntensityRange | None = None
 
     def observe(self, image: np.ndarray) -> IntensityRange:
         """Return the range for this frame, seen on a regular subset of its pixels."""
-        measured = self._measure(image)
-        if self._range is None or self._jumped(measured):
-            self._range = measured
-        else:
-            rate = self._config.smoothing
-            self._range = IntensityRange(
-                self._range.low + rate * (measured.low - self._range.low),
-                self._range.high + rate * (measured.high - self._range.high))
-        return self._range
+        return self.examine(image).intensity
 
-    def _measure(self, image: np.ndarray) -> IntensityRange:
-        """Return the percentiles of a frame."""
-        step = max(1, int((image.shape[0] * image.shape[1] / _PROBE_POINTS)**0.5))
-        probe = to_gray(np.ascontiguousarray(image[step // 2::step, step // 2::step]))
-        finite = probe[np.isfinite(probe)] if probe.dtype == np.float32 else probe
-        if finite.size == 0:
+    def examine(self, image: np.ndarray) -> FrameCondition:
+        """
+        Take note of a frame and return what it is like.
+
+        Parameters
+        ----------
+        image : ndarray
+            As `check_image` accepts it; pixels without a finite value do not count.
+
+        Raises
+        ------
+        ImageError
+            When no pixel is finite; the frame is then forgotten.
+
+        """
+        probe = take_probe(image)
+        upright, mirrored = self._measure(image, probe)
+        switched = self._polarity.observe(probe, upright.low, upright.high)
+        inverted = self._polarity.inverted
+        self._range = self._follow(mirrored if inverted else upright, at_once=switched)
+        frozen = self._probe is not None and is_frozen(self._probe, probe)
+        self._probe = probe
+        return FrameCondition(self._range.turned() if inverted else self._range, frozen, inverted)
+
+    def _measure(self, image: np.ndarray,
+                 probe: np.ndarray) -> tuple[IntensityRange, IntensityRange]:
+        """Return the percentiles of a frame, counted from below and from above."""
+        values = probe[np.isfinite(probe)] if probe.dtype == np.float32 else probe.ravel()
+        if values.size == 0:
             raise ImageError('the image has no finite pixel; expected counts or temperatures')
-        low, high = np.percentile(
-            finite, (self._config.low_percentile, self._config.high_percentile))
-        if high <= low:
-            low, high = float(finite.min()), float(finite.max())
-        return IntensityRange(float(low), float(high) if high > low else float(low) + 1.0)
+        low, high = self._config.low_percentile, self._config.high_percentile
+        shares = (low, high, 100 - high, 100 - low)
+        start, *ends, end = percentiles(values, (_MOST[0], *shares, _MOST[1]))
+        if max(start - min(ends), max(ends) - end) > _FAR * (end - start):
+            credible = credible_values(image, probe, end - start)
+            if credible.size and credible.max() > credible.min():
+                values, ends = credible, percentiles(credible, shares)
+        return _range(values, *ends[:2]), _range(values, *ends[2:])
+
+    def _follow(self, measured: IntensityRange, at_once: bool) -> IntensityRange:
+        """Return the range after one more frame."""
+        if self._range is None or at_once or self._jumped(measured):
+            return measured
+        rate = self._config.smoothing
+        return IntensityRange(self._range.low + rate * (measured.low - self._range.low),
+                              self._range.high + rate * (measured.high - self._range.high))
 
     def _jumped(self, measured: IntensityRange) -> bool:
         """Return whether the range has changed by more than a smooth scene explains."""
         assert self._range is not None
         change = max(abs(measured.low - self._range.low), abs(measured.high - self._range.high))
         return change > self._config.jump * (self._range.high - self._range.low)
+
+
+def _range(values: np.ndarray, low: float, high: float) -> IntensityRange:
+    """Return the range from `low` to `high`, wider where these are the same."""
+    if high <= low:
+        low, high = float(values.min()), float(values.max())
+    return IntensityRange(low, high if high > low else low + 1.0)

@@ -23,7 +23,8 @@ from lmsco_ros.core.validation import check_choice, check_range
 
 __all__ = [
     'ChannelConfig', 'ConfidenceConfig', 'FeatureConfig', 'IntensityConfig', 'LearningConfig',
-    'MotionConfig', 'NETWORK_KINDS', 'NetworkConfig', 'RuntimeConfig', 'SamplingConfig', 'ScaleConfig',
+    'MotionConfig', 'NETWORK_KINDS', 'NetworkConfig', 'RegistrationConfig', 'RuntimeConfig',
+    'SamplingConfig', 'ScaleConfig',
 ]
 
 NETWORK_KINDS = ('appearance', 'motion')
@@ -310,6 +311,34 @@ class ScaleConfig:
         if reach > _LARGEST_SCALE:
             raise ConfigError(f'ScaleConfig.step and its exponents reach a factor of {reach:g} '
                               f'from one frame to the next; expected at most {_LARGEST_SCALE:g}')
+
+
+@dataclass(frozen=True)
+class RegistrationConfig:
+    """
+    Registration of the target to its first frame.
+
+    Attributes
+    ----------
+    backbone : str
+        Name of the weights of the network that compares; empty for no registration.
+    center_rate, size_rate : float
+        Part of the way that the box follows what the network says in one frame.
+    largest_step : float
+        Logarithm of the largest factor of width or height that is believed.
+
+    """
+
+    backbone: str = ''
+    center_rate: float = 1.0
+    size_rate: float = 0.5
+    largest_step: float = 0.2
+
+    def __post_init__(self) -> None:
+        """Check the ranges."""
+        check_range(self, 'center_rate', 0, 1)
+        check_range(self, 'size_rate', 0, 1)
+        check_range(self, 'largest_step', 0, 2)
 
 
 @dataclass(frozen=True)

@@ -31,6 +31,7 @@ from lmsco_ros.core.fourier.localization import centered_map, locate, Peak
 from lmsco_ros.core.fourier.series import grid_size, shift
 from lmsco_ros.core.intensity import AutomaticGain
 from lmsco_ros.core.learning.structured_operator import StructuredOperator
+from lmsco_ros.core.registration import Registration
 from lmsco_ros.core.sampling import (
     check_box, clamp_box, FrameView, patch_size, region_around, search_tiles)
 from lmsco_ros.core.scale import make_scale_estimator
@@ -120,6 +121,9 @@ class Track:
         self._operator = self._learn_first(view, backend)
         self._scale = make_scale_estimator(config.scale, box.size)
         self._scale.learn(view, box)
+        self._registration = Registration(
+            config.registration, networks['registration'], view, box) if (
+            'registration' in networks) else None
         self._first = self._detect(view, box)
         self._watch(view)
 
@@ -211,8 +215,10 @@ class Track:
         self._tile = 0
         moved = self._box.moved_to(detection.center).scaled(detection.scale)
         moved = clamp_box(moved, view.size)
-        factor = self._scale.estimate(view, moved)
-        self._box = clamp_box(moved.scaled(factor), view.size)
+        moved = moved.scaled(self._scale.estimate(view, moved))
+        if self._registration is not None:
+            moved = self._registration(view, moved).box
+        self._box = clamp_box(moved, view.size)
 
     def _learn(self, view: FrameView, detection: Detection) -> None:
         """Store the sample; when it is time, train the filter and the scale estimator."""

@@ -26,8 +26,8 @@ import numpy as np
 from lmsco_ros.core.backend import limit_threads, select_backend
 from lmsco_ros.core.config import TrackerConfig
 from lmsco_ros.core.errors import ImageError, NotInitializedError
-from lmsco_ros.core.features.extractor import load_networks
 from lmsco_ros.core.intensity import check_image
+from lmsco_ros.core.networks import load_networks
 from lmsco_ros.core.track import Track
 from lmsco_ros.core.types import BoundingBox, TrackResult
 

@@ -19,13 +19,14 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Iterable, Mapping, Optional, Sequence
 
+from lmsco_ros.evaluation.challenges import CHALLENGES
 from lmsco_ros.evaluation.errors import DatasetError
 from lmsco_ros.evaluation.execution import PROTOCOLS
 from lmsco_ros.evaluation.report.conditions import conditions, problems
 from lmsco_ros.evaluation.report.formatting import spread_warning
 from lmsco_ros.evaluation.report.tables import (
-    Cell, confidence_table, difference_rows, DifferenceRow, one_pass_table, supervised_table,
-    Table)
+    absence_table, Cell, confidence_table, difference_rows, DifferenceRow, one_pass_table,
+    supervised_table, Table)
 from lmsco_ros.evaluation.run_file import EvaluationRun, read_run
 from lmsco_ros.evaluation.split import load_split
 from lmsco_ros.evaluation.summaries.confidence import summarize_confidence
@@ -71,6 +72,13 @@ one without; 0.5 is guessing. LOST is false when it is declared on a target that
 and was covered by more than half one frame before.
 """
 
+_ABSENCE_NOTE = """\
+Frames without the target are claimed when a box is given and the state is not LOST. A
+target returns after an absence, or by a jump of more than two of its sizes, and stays for
+30 frames at least; it is found again when within these a box covers it by more than half
+and the state is not LOST. Boxes without any overlap before that are claims elsewhere.
+"""
+
 
 def results_page(folders: Sequence[Path]) -> str:
     """
@@ -93,8 +101,9 @@ def results_page(folders: Sequence[Path]) -> str:
         raise DatasetError(f'no results in {", ".join(map(str, folders))}; '
                            'give output folders of `lmsco evaluate`')
     parts = [_INTRODUCTION]
-    for title, groups in _scenes(next(iter(runs.values()))):
-        parts += _scene(title, {name: run.only(groups) for name, run in runs.items()})
+    for title, groups, challenge in _scenes(next(iter(runs.values()))):
+        parts += _scene(title, {name: run.only(groups, challenge)
+                                for name, run in runs.items()})
     parts += ['## Conditions\n', _conditions(runs)]
     return '\n'.join(parts)
 
@@ -121,13 +130,21 @@ def _names(run: EvaluationRun) -> list[tuple[str, int]]:
     return [(sequence.full_name, len(sequence.ground_truth)) for sequence in run.sequences]
 
 
-def _scenes(run: EvaluationRun) -> list[tuple[str, Optional[tuple[str, ...]]]]:
-    """Return the kinds of scene that the run has sequences of, then all together."""
+def _scenes(run: EvaluationRun) -> list[tuple[str, Optional[tuple[str, ...]], Optional[str]]]:
+    """
+    Return what has a chapter of its own: title, groups and challenge, None for any.
+
+    These are the challenges, or else the kinds of scene that the run has sequences of, and
+    all sequences together.
+    """
+    if run.challenges:
+        return [(f'{name}: {CHALLENGES[name].description}', None, name)
+                for name in run.challenges]
     present = {sequence.group for sequence in run.sequences}
-    found: list[tuple[str, Optional[tuple[str, ...]]]] = [
-        (f'{scene.capitalize()} ({", ".join(groups)})', groups)
+    found: list[tuple[str, Optional[tuple[str, ...]], Optional[str]]] = [
+        (f'{scene.capitalize()} ({", ".join(groups)})', groups, None)
         for scene, groups in load_split().scenes.items() if present & set(groups)]
-    return found + [('All sequences', None)] if len(found) != 1 else found
+    return found + [('All sequences', None, None)] if len(found) != 1 else found
 
 
 def _scene(title: str, runs: Mapping[str, EvaluationRun]) -> list[str]:
@@ -140,8 +157,7 @@ def _scene(title: str, runs: Mapping[str, EvaluationRun]) -> list[str]:
         aucs = {item.tracker: item.aucs for item in summaries}
         parts += ['### One pass\n', _ONE_PASS_NOTE, _markdown(one_pass_table(summaries)),
                   _comparison(difference_rows(differences(aucs, True), 3), 'success AUC'),
-                  '### Confidence\n', _CONFIDENCE_NOTE,
-                  _markdown(confidence_table(summarize_confidence(runs['ope'])))]
+                  *_confidence(runs['ope'])]
     if 'vot' in runs:
         supervised = summarize_supervised(runs['vot'])
         failures = {item.tracker: item.failures for item in supervised}
@@ -151,6 +167,13 @@ def _scene(title: str, runs: Mapping[str, EvaluationRun]) -> list[str]:
                   _comparison(difference_rows(differences(failures, False), 2),
                               'failures per sequence (fewer is better)')]
     return parts
+
+
+def _confidence(run: EvaluationRun) -> list[str]:
+    summaries = summarize_confidence(run)
+    absence = absence_table(summaries)
+    parts = ['### Confidence\n', _CONFIDENCE_NOTE, _markdown(confidence_table(summaries))]
+    return parts + ([_ABSENCE_NOTE, _markdown(absence)] if absence is not None else [])
 
 
 def _comparison(rows: Sequence[DifferenceRow], figure: str) -> str:

@@ -52,6 +52,8 @@ class SequenceInfo:
         True boxes, NaN where absent.
     attributes : mapping of str to ndarray, shape (n,), bool
         Annotated attributes; empty where unknown.
+    challenge : str
+        What the sequence was made harder with; empty for one as it was recorded.
 
     """
 
@@ -60,6 +62,7 @@ class SequenceInfo:
     size: tuple[int, int]
     ground_truth: npt.NDArray[np.float64]
     attributes: Mapping[str, npt.NDArray[np.bool_]]
+    challenge: str = ''
 
     @property
     def full_name(self) -> str:
@@ -77,7 +80,7 @@ class SequenceInfo:
         flags = {name: np.flatnonzero(values).tolist()
                  for name, values in self.attributes.items()}
         return {'name': self.name, 'group': self.group, 'size': list(self.size),
-                'ground_truth': rows, 'attributes': flags}
+                'ground_truth': rows, 'attributes': flags, 'challenge': self.challenge}
 
     @classmethod
     def from_json(cls, content: Mapping[str, Any]) -> SequenceInfo:
@@ -87,7 +90,7 @@ class SequenceInfo:
         attributes = {name: np.isin(frames, indices)
                       for name, indices in content['attributes'].items()}
         return cls(content['name'], content['group'], tuple(content['size']),
-                   np.array(rows, dtype=float), attributes)
+                   np.array(rows, dtype=float), attributes, content.get('challenge', ''))
 
 
 @dataclass(frozen=True, eq=False)
@@ -124,10 +127,18 @@ class EvaluationRun:
                      for sequence, trace in zip(self.sequences, self.traces[tracker])
                      if trace.error)
 
-    def only(self, groups: Optional[tuple[str, ...]]) -> EvaluationRun:
-        """Return the run on the sequences of `groups`; None keeps all."""
+    @property
+    def challenges(self) -> tuple[str, ...]:
+        """Challenges of the sequences in their order; empty without any."""
+        found = dict.fromkeys(sequence.challenge for sequence in self.sequences)
+        return tuple(name for name in found if name)
+
+    def only(self, groups: Optional[tuple[str, ...]] = None,
+             challenge: Optional[str] = None) -> EvaluationRun:
+        """Return the run on the sequences of `groups` and of `challenge`; None keeps all."""
         kept = [index for index, sequence in enumerate(self.sequences)
-                if groups is None or sequence.group in groups]
+                if (groups is None or sequence.group in groups)
+                and (challenge is None or sequence.challenge == challenge)]
         return EvaluationRun(
             self.protocol, tuple(self.sequences[index] for index in kept),
             {name: tuple(traces[index] for index in kept)

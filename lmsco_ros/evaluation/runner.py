@@ -107,4 +107,4 @@ class Evaluation:
             return
         self._infos[sequence.full_name] = SequenceInfo(
             sequence.name, sequence.group, (width, height),
-            sequence.ground_truth, sequence.attributes)
+            sequence.ground_truth, sequence.attributes, sequence.challenge)

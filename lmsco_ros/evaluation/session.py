@@ -22,6 +22,7 @@ from fnmatch import fnmatch
 from pathlib import Path
 from typing import Any, Optional, Sequence
 
+from lmsco_ros.evaluation.challenges import apply_challenge
 from lmsco_ros.evaluation.datasets import BrokenSequence, scan_dataset, TrackingSequence
 from lmsco_ros.evaluation.environment import machine, versions
 from lmsco_ros.evaluation.errors import DatasetError, SequenceError, TrackerError
@@ -44,6 +45,8 @@ class Request:
         Only the first so many frames of each sequence.
     part : str or None
         Only this part of the fixed split.
+    challenges : tuple of str
+        Each sequence once with each of these challenges; empty: as it was recorded.
 
     """
 
@@ -51,6 +54,7 @@ class Request:
     pattern: str = '*'
     frames: Optional[int] = None
     part: Optional[str] = None
+    challenges: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -85,6 +89,12 @@ def select_sequences(request: Request) -> Selection:
     if request.frames is not None:
         chosen, empty = _cut(chosen, request.frames)
         broken += empty
+    if request.challenges:
+        chosen, unfit = _challenged(chosen, request.challenges)
+        broken += unfit
+    if not chosen:
+        reasons = ''.join(f'\n  {item.name}: {item.reason}' for item in broken)
+        raise DatasetError(f'no sequence is left to evaluate{reasons}')
     return Selection(tuple(chosen), tuple(broken))
 
 
@@ -125,7 +135,8 @@ def describe(request: Request, jobs: int, skipped: Sequence[BrokenSequence]) -> 
     """Return the conditions of a run for its run file; no paths, no host."""
     return {
         'dataset': request.dataset.resolve().name, 'sequences': request.pattern,
-        'frames': request.frames, 'split': request.part, 'jobs': jobs,
+        'frames': request.frames, 'split': request.part,
+        'challenges': list(request.challenges), 'jobs': jobs,
         'date': date.today().isoformat(), 'machine': machine(), 'versions': dict(versions()),
         'skipped': [{'name': item.name, 'reason': item.reason} for item in skipped],
     }
@@ -141,6 +152,19 @@ def _cut(sequences: Sequence[TrackingSequence], frames: int,
         except SequenceError as error:
             empty.append(BrokenSequence(sequence.full_name, f'first {frames} frames: {error}'))
     return kept, empty
+
+
+def _challenged(sequences: Sequence[TrackingSequence], challenges: Sequence[str],
+                ) -> tuple[list[TrackingSequence], list[BrokenSequence]]:
+    """Return each sequence with each challenge, and the pairs that do not fit together."""
+    made, unfit = [], []
+    for challenge in challenges:
+        for sequence in sequences:
+            try:
+                made.append(apply_challenge(sequence, challenge))
+            except SequenceError as error:
+                unfit.append(BrokenSequence(f'{sequence.full_name}+{challenge}', str(error)))
+    return made, unfit
 
 
 def _matches(full_name: str, pattern: str) -> bool:

@@ -63,6 +63,28 @@ def test_evaluate_then_results(lmsco, dataset, scripted, tmp_path):
     assert '| Scripted |' in table.read_text(encoding='utf-8')
 
 
+def test_challenges_have_records_and_tables_of_their_own(lmsco, dataset, scripted, tmp_path):
+    output = tmp_path / 'out'
+    common = ('evaluate', dataset, '--tracker', scripted, '--output', output)
+    assert lmsco(*common).exit_code == 0
+    made = lmsco(*common, '--challenge', 'telemetry', '--challenge', 'disappear_1s',
+                 '--challenge', 'dead_pixels')
+    assert made.exit_code == 0, made.output
+    assert 'results are there already' not in made.output
+    assert 'skipped vot_tir/steady+disappear_1s: 12 frames; this challenge needs' in made.output
+    names = {path.name.rpartition('-')[0] for path in output.rglob('records/**/*.json')}
+    assert names == {f'vot_tir-{name}{ending}' for name in ('steady', 'rough')
+                     for ending in ('', '+telemetry', '+dead_pixels')}
+    page = (output / 'report.html').read_text(encoding='utf-8')
+    assert 'By challenge' in page and 'dead_pixels: dead pixels, rows and columns' in page
+    assert '--challenge telemetry --challenge disappear_1s' in page
+    again = lmsco(*common, '--challenge', 'dead_pixels')
+    assert '2 results are there already, 0 to go' in again.output
+    table = tmp_path / 'results.md'
+    assert lmsco('results', output, '--page', table).exit_code == 0
+    assert '## dead_pixels: dead pixels, rows' in table.read_text(encoding='utf-8')
+
+
 def test_sequences_and_frames_narrow_the_work_of_a_preset(lmsco, dataset, tmp_path):
     output = tmp_path / 'out'
     result = lmsco('evaluate', dataset, '--tracker', 'hcs', '--output', output,
@@ -76,6 +98,8 @@ def test_sequences_and_frames_narrow_the_work_of_a_preset(lmsco, dataset, tmp_pa
     (('--tracker', 'nobody'), 'there is no tracker'),
     (('--sequences', 'nothing'), 'no usable sequence'),
     (('--split', 'test'), 'no sequence of this dataset'),
+    (('--challenge', 'fog'), "there is no challenge 'fog'; known are"),
+    (('--challenge', 'leave'), 'no sequence is left to evaluate'),
 ])
 def test_mistakes_are_told_in_one_line(lmsco, dataset, scripted, tmp_path, words, reason):
     trackers = () if '--tracker' in words else ('--tracker', scripted)

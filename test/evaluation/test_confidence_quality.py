@@ -19,7 +19,10 @@ import math
 import numpy as np
 import pytest
 
-from lmsco_ros.evaluation.protocols.confidence import auroc, auroc_terms, lost_figures
+from lmsco_ros.evaluation.geometry import overlaps
+from lmsco_ros.evaluation.protocols.confidence import (
+    auroc, auroc_terms, lost_figures, return_figures)
+from lmsco_ros.evaluation.trace import Trace
 
 
 def pooled(scores, overlap, weights=None):
@@ -71,3 +74,66 @@ def test_lost_is_false_only_while_the_box_was_right():
     figures = lost_figures(lost, overlap)
     assert figures.false_alarms == 1
     assert figures.lost_while_present == 3
+
+
+def returning(truth, boxes, lost=(), starts=(0,)):
+    """Return the figures of answers, given as x of boxes of 10 pixels, NaN for none."""
+    def rows(values):
+        values = np.asarray(values, dtype=float)
+        return np.where(np.isfinite(values)[:, None],
+                        np.stack([values, *[np.full(len(values), 10.)] * 3], axis=1), np.nan)
+    ground_truth, answers = rows(truth), rows(boxes)
+    marks = np.zeros(len(truth), bool)
+    marks[list(lost)] = True
+    trace = Trace(answers, np.full(len(truth), np.nan), marks, starts)
+    return return_figures(ground_truth, trace, overlaps(ground_truth, answers))
+
+
+def test_a_target_is_found_again_when_the_box_is_right_and_not_lost():
+    truth = [0] * 5 + [np.nan] * 4 + [0] * 30
+    # Claimed in two of four absent frames; right box from frame 9 on, believed from 12 on.
+    figures = returning(truth, [0] * 39, lost=range(7, 12))
+    assert (figures.absent, figures.claimed) == (4, 2)
+    assert figures.delays == (3,)
+    assert figures.mistaken == 0
+
+
+def test_claims_elsewhere_count_until_the_target_is_found():
+    truth = [0] * 5 + [np.nan] * 5 + [0] * 40
+    elsewhere = [0] * 10 + [50] * 6 + [0] * 34
+    figures = returning(truth, elsewhere)
+    assert figures.delays == (6,) and figures.mistaken == 1
+    # In LOST nothing is claimed, and a box that is half right is not elsewhere.
+    assert returning(truth, elsewhere, lost=range(8, 16)).mistaken == 0
+    assert returning(truth, [0] * 10 + [7] * 6 + [0] * 34).mistaken == 0
+    # Claims after that are a new mistake, not one of the return.
+    late = returning(truth, [0] * 11 + [50] * 39)
+    assert late.delays == (0,) and late.mistaken == 0
+    # No box is no claim.
+    silent = returning(truth, [0] * 5 + [np.nan] * 45)
+    assert silent.delays == (None,) and (silent.claimed, silent.mistaken) == (0, 0)
+
+
+def test_a_return_has_thirty_frames():
+    truth = [0] * 5 + [np.nan] * 5 + [0] * 40
+    assert returning(truth, [0] * 5 + [50] * 34 + [0] * 11).delays == (29,)
+    assert returning(truth, [0] * 5 + [50] * 35 + [0] * 10).delays == (None,)
+    # Shorter ones are nobody's fault.
+    assert returning(truth[:39], [50] * 39).delays == ()
+    twice = [0] * 5 + [np.nan, 0] * 5 + [np.nan] + [0] * 30
+    assert returning(twice, [0] * len(twice)).delays == (0,)
+
+
+def test_a_jump_is_a_return_and_flying_is_none():
+    flying = np.arange(80) * 15.
+    assert returning(flying, flying).delays == ()
+    jumping = np.r_[np.zeros(40), np.full(40, 21.)]
+    figures = returning(jumping, np.r_[np.zeros(44), np.full(36, 21.)])
+    assert figures.delays == (4,) and figures.mistaken == 1
+    assert figures.absent == figures.claimed == 0
+
+
+def test_nothing_counts_before_the_start():
+    truth = [np.nan] * 6 + [0] * 40
+    figures = returning(truth, [np.nan] * 6 + [0] * 40, starts=(6,))
+    assert (figures.absent, figures.claimed, figures.delays) == (0, 0, ())

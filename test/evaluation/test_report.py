@@ -177,6 +177,30 @@ def test_results_page_has_a_table_for_each_kind_of_scene(tmp_path, runs):
     assert np.allclose(again.traces['csrt'][1].boxes, runs['vot'].traces['csrt'][1].boxes)
 
 
+def test_absences_have_a_table_only_where_there_are_any(parse, runs):
+    assert 'targets that left' not in parse(runs).text
+    infos = []
+    for info, challenge in zip(runs['ope'].sequences, ('leave', 'twin')):
+        truth = info.ground_truth.copy()
+        truth[8:12] = np.nan if challenge == 'leave' else truth[8:12]
+        infos.append(SequenceInfo(info.name, info.group, info.size, truth, info.attributes,
+                                  challenge))
+    run = runs['ope']
+    page = parse({'ope': EvaluationRun('ope', tuple(infos), run.traces, run.context)})
+    assert page.text.count('targets that left') == 1
+    assert page.text.count('AUROC of the score') == 2
+    assert 'leave: the picture pans away from the target and back' in page.text
+
+
+def test_pictures_show_images_with_pixels_without_a_value():
+    image = np.tile(np.linspace(7000, 7600, 64, dtype=np.float32), (48, 1))
+    image[4:8, 4:8] = np.nan
+    image[40:44] = np.inf
+    box = np.array([[20., 10, 20, 20]])
+    strip = failure_strip([image], box, box, [0], '#ff0000')
+    assert strip.std() > 20
+
+
 def test_figures_as_text():
     assert number(.5) == '.500' and number(float('nan')) == '–' and number(12.345, 1) == '12.3'
     assert number(-.25) == '−.250'

@@ -21,7 +21,7 @@ import pytest
 
 from lmsco_ros.evaluation.run_file import EvaluationRun, SequenceInfo
 from lmsco_ros.evaluation.summaries.attributes import attribute_names, summarize_attributes
-from lmsco_ros.evaluation.summaries.confidence import summarize_confidence
+from lmsco_ros.evaluation.summaries.confidence import confidence_parts, summarize_confidence
 from lmsco_ros.evaluation.summaries.differences import differences, reference_of
 from lmsco_ros.evaluation.summaries.one_pass import summarize_one_pass
 from lmsco_ros.evaluation.summaries.supervised import eao_interval, summarize_supervised
@@ -116,6 +116,34 @@ def test_confidence_pools_sequences():
     assert summary.false_alarms.value == pytest.approx(1000 / 4)
     assert summary.lost_share.value == pytest.approx(1 / 4)
     assert summary.departures == 0 and math.isnan(summary.delay)
+
+
+def test_absences_and_returns_pool_sequences():
+    truth = np.tile([10., 10, 10, 10], (50, 1))
+    truth[5:15] = np.nan
+    infos = tuple(SequenceInfo(name, 'group', (100, 100), truth, {}, challenge)
+                  for name, challenge in (('a', 'leave'), ('b', 'leave'), ('c', 'twin')))
+    found = trace([1] * 20 + [1] * 30, lost=range(8, 17))
+    elsewhere = trace([1] * 5 + [0] * 45)
+    run = EvaluationRun('ope', infos, {'one': (found, elsewhere, found)})
+    (summary,) = summarize_confidence(run.only(challenge='leave'))
+    assert (summary.departures, summary.declared, summary.delay) == (2, 1, 3)
+    assert summary.absent == 20
+    assert summary.claimed_share.value == pytest.approx((3 + 10) / 20)
+    assert (summary.returns, summary.found, summary.found_delay) == (2, 1, 2)
+    assert summary.found_share.value == pytest.approx(1 / 2)
+    assert summary.mistaken == 1
+    assert [(name, len(part.sequences)) for name, part in confidence_parts(run)] == [
+        ('leave', 2), ('twin', 1)]
+
+
+def test_a_run_without_challenges_is_judged_as_one():
+    run = EvaluationRun('ope', (sequence('a', 2), sequence('b', 2)), {
+        'one': (trace([1, 1]), trace([1, 1]))})
+    assert run.challenges == () and confidence_parts(run) == [('', run)]
+    (summary,) = summarize_confidence(run)
+    assert summary.returns == summary.absent == 0
+    assert math.isnan(summary.claimed_share.value) and math.isnan(summary.found_share.value)
 
 
 def test_differences_are_to_csrt_or_the_first():

@@ -152,4 +152,7 @@ def test_gain_is_that_of_the_first_image():
     assert view(first).min() == 0 and view(first).max() == 255
     warmer = view(first + 300)
     assert warmer.mean() > view(first).mean()
+    spots = first.astype(np.float32)
+    spots[0, :3] = np.nan, -np.inf, np.inf
+    assert EightBitView(spots)(spots)[0, :3, 0].tolist() == [0, 0, 255]
     assert (EightBitView(np.full((4, 4), 7, np.uint8))(np.full((4, 4), 9, np.uint8)) == 9).all()

@@ -120,7 +120,10 @@ def test_commands_of_the_command_line_exist():
     lines = re.findall(r'^lmsco (?!-)(\S+)(.*)$', '\n'.join(blocks('bash')), re.M)
     assert len(lines) >= 4
     for name, arguments in [*lines, ('demo', ''), ('evaluate', '')]:
-        options = {option for parameter in commands[name].params for option in parameter.opts}
+        command = commands[name]
+        if hasattr(command, 'commands'):
+            command = command.commands[arguments.split()[0]]
+        options = {option for parameter in command.params for option in parameter.opts}
         assert set(re.findall(r'--[\w-]+', arguments.split('#')[0])) <= options
 
 

@@ -51,6 +51,20 @@ class Layer:
     channels: int
     offset: float = 0.0
 
+    def first_cell(self, margin: int) -> int:
+        """
+        Return the cell that looks nearest to the middle of the first square inside a margin.
+
+        It looks first_cell * stride + offset - margin pixels past that middle.
+
+        Parameters
+        ----------
+        margin : int
+            Pixels by which the input was extended on every side.
+
+        """
+        return round((margin - self.offset) / self.stride)
+
 
 class Backbone(torch.nn.Module):
     """
@@ -66,10 +80,8 @@ class Backbone(torch.nn.Module):
     aliases : mapping of str to str
         The layers that a configuration for any network may call `shallow` and `deep`.
     margin : int
-        Pixels by which the input is extended on every side, so that the middle S / stride cells
-        of every layer cover the middle S pixels, to within half a cell: of n cells, the middle
-        ones begin at k = (n - S / stride) // 2 and look k * stride + offset - margin pixels past
-        the middles of the squares they stand for.
+        Pixels by which the input is extended on every side, so that S / stride cells of every
+        layer, beginning with `first_cell`, cover the middle S pixels to within half a cell.
 
     """
 

@@ -18,6 +18,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+import numpy as np
 import torch
 from torch import nn
 
@@ -63,6 +64,16 @@ class RegistrationNet(Backbone):
         maps = torch.relu_(self.conv1(standardize(images)))
         maps = torch.relu_(self.conv2(maps))
         return [torch.relu_(self.conv3(maps))]
+
+    @torch.inference_mode()
+    def encode(self, patch: np.ndarray) -> torch.Tensor:
+        """Return the encoding of one patch, shape (size, size), float32."""
+        return self(torch.from_numpy(patch)[None, None].to(self.answer.weight.device))[0]
+
+    @torch.inference_mode()
+    def relate(self, first: torch.Tensor, now: torch.Tensor) -> np.ndarray:
+        """Return the answer of `compare` for one pair of encodings, shape (5,)."""
+        return self.compare(first, now)[0].cpu().numpy()
 
     def compare(self, first: torch.Tensor, now: torch.Tensor) -> torch.Tensor:
         """

@@ -48,6 +48,8 @@ class WeightsSource:
         The published file; for bundled weights the file beside the network definitions.
     url : str or None
         Where that file is published; None where it has no stable address.
+    page : str or None
+        Where a person finds it, when `url` is None.
     sha256 : str or None
         Of that file; None where its authors publish none.
     bundled : bool
@@ -61,6 +63,7 @@ class WeightsSource:
     license: str
     file_name: str
     url: str | None = None
+    page: str | None = None
     sha256: str | None = None
     bundled: bool = False
 
@@ -99,7 +102,8 @@ WEIGHTS = (
         purpose='motion network of the paper, trained on optical flow of human actions',
         architecture=MotionCNN,
         license='unknown',
-        file_name='motion_cnn.caffemodel'),
+        file_name='motion_cnn.caffemodel',
+        page='https://people.eecs.berkeley.edu/~gkioxari/ActionTubes/'),
     WeightsSource(
         name='squeezenet_v1.0',
         purpose='small appearance network, trained on ImageNet',

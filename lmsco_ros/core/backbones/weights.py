@@ -17,6 +17,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 import os
 from pathlib import Path
 
@@ -24,14 +25,37 @@ import numpy as np
 import platformdirs
 
 from lmsco_ros.core.backbones.backbone import Backbone
-from lmsco_ros.core.backbones.formats import read_arrays, READERS
+from lmsco_ros.core.backbones.download import download, file_sha256, Progress
+from lmsco_ros.core.backbones.formats import read_about, read_arrays, READERS, write_arrays
 from lmsco_ros.core.backbones.registry import find_source, WeightsSource
 from lmsco_ros.core.errors import WeightsError
 
-__all__ = ['DIRECTORY_VARIABLE', 'fitting_arrays', 'find_file', 'load_backbone',
-           'weights_directory']
+__all__ = ['DIRECTORY_VARIABLE', 'Verification', 'fetch_weights', 'find_file', 'fitting_arrays',
+           'import_weights', 'load_backbone', 'locate', 'verify_weights', 'weights_directory']
 
 DIRECTORY_VARIABLE = 'LMSCO_WEIGHTS_DIR'
+
+
+@dataclass(frozen=True)
+class Verification:
+    """
+    What is known of a set of weights that was found to be whole.
+
+    Attributes
+    ----------
+    path : Path
+        The file.
+    numbers : int
+        Number of weights.
+    source_sha256 : str or None
+        Checksum of the file that was imported, or of this one where it is as published; None
+        where that is not told.
+
+    """
+
+    path: Path
+    numbers: int
+    source_sha256: str | None
 
 
 def weights_directory(override: Path | None = None) -> Path:
@@ -71,9 +95,16 @@ def load_backbone(name: str, directory: Path | None = None) -> Backbone:
     return source.architecture.from_arrays(fitting_arrays(source, read_arrays(path), path))
 
 
+def locate(source: WeightsSource, directory: Path | None = None) -> Path | None:
+    """Return the file that holds a set of weights, converted or as published, or None."""
+    folder = Path(__file__).parent if source.bundled else weights_directory(directory)
+    names = (*(f'{source.name}{suffix}' for suffix in READERS), source.file_name)
+    return next((folder / name for name in names if (folder / name).is_file()), None)
+
+
 def find_file(source: WeightsSource, directory: Path | None = None) -> Path:
     """
-    Return the file that holds a set of weights: the converted one, or one as published.
+    Return the file that holds a set of weights, converted or as published.
 
     Raises
     ------
@@ -81,19 +112,111 @@ def find_file(source: WeightsSource, directory: Path | None = None) -> Path:
         When there is none; tells how to get it.
 
     """
-    folder = Path(__file__).parent if source.bundled else weights_directory(directory)
-    names = [f'{source.name}{suffix}' for suffix in READERS]
-    for name in (*names, source.file_name):
-        if (folder / name).is_file():
-            return folder / name
+    path = locate(source, directory)
+    if path is not None:
+        return path
     if source.bundled:
         raise WeightsError(f'the installed package lacks {source.file_name}; install it again')
-    ways = [f'`lmsco weights import FILE --as {source.name}` where you have the file']
+    way = f'`lmsco weights import FILE --as {source.name}` where you have the file'
     if source.url:
-        ways.insert(0, f'`lmsco weights fetch {source.name}` to download it')
-    raise WeightsError(
-        f'the weights {source.name} are not in {folder}; run {", or ".join(ways)}; '
-        'the presets default and hcs need none')
+        way = f'`lmsco weights fetch {source.name}` to download them, or {way}'
+    elif source.page:
+        way = f'{way} (see {source.page})'
+    raise WeightsError(f'the weights {source.name} are not in {weights_directory(directory)}; '
+                       f'run {way}; the presets default and hcs need none')
+
+
+def import_weights(file: Path, name: str, directory: Path | None = None) -> Path:
+    """
+    Convert a file of any known format to the one that loads fast, and return where it is.
+
+    Parameters
+    ----------
+    file : Path
+        A published file, see `READERS` for the formats.
+    name : str
+        The weights that it holds, of the registry.
+    directory : Path, optional
+        See `weights_directory`.
+
+    Raises
+    ------
+    WeightsError
+        When the name is unknown or of bundled weights, or the file is damaged, holds another
+        network, or bears the name of the published file but not its checksum.
+
+    """
+    source = _foreign_source(name)
+    found = file_sha256(file)
+    if file.name == source.file_name and source.sha256 not in (None, found):
+        raise WeightsError(f'{file} has the SHA-256 checksum {found}, expected {source.sha256}; '
+                           'it is damaged or was changed: get it again')
+    arrays = fitting_arrays(source, read_arrays(file), file)
+    path = weights_directory(directory) / f'{source.name}.safetensors'
+    write_arrays(path, arrays, {'weights': source.name, 'source_file': file.name,
+                                'source_sha256': found})
+    return path
+
+
+def fetch_weights(name: str, directory: Path | None = None,
+                  progress: Progress = lambda done, total: None) -> Path:
+    """
+    Download the published file of a set of weights, convert it, and return where it is.
+
+    Parameters
+    ----------
+    name, directory
+        As for `import_weights`.
+    progress : callable
+        As for `download`.
+
+    Raises
+    ------
+    WeightsError
+        When the weights have no address, or as for `download` and `import_weights`.
+
+    """
+    source = _foreign_source(name)
+    if source.url is None:
+        where = f'look at {source.page}, then' if source.page else 'get the file, then'
+        raise WeightsError(f'the weights {name} have no address to download from; {where} run '
+                           f'`lmsco weights import FILE --as {name}`')
+    file = weights_directory(directory) / source.file_name
+    download(source.url, file, source.sha256, progress)
+    try:
+        return import_weights(file, name, directory)
+    finally:
+        file.unlink()
+
+
+def _foreign_source(name: str) -> WeightsSource:
+    """Return the source of weights that a user has to get."""
+    source = find_source(name)
+    if source.bundled:
+        raise WeightsError(f'the weights {name} come with the package; there is nothing to get')
+    return source
+
+
+def verify_weights(name: str, directory: Path | None = None) -> Verification:
+    """
+    Return what is known of a set of weights, read and checked in full.
+
+    Raises
+    ------
+    WeightsError
+        When they are missing or damaged, hold another network, or were made from a file with
+        another checksum than the published one.
+
+    """
+    source = find_source(name)
+    path = find_file(source, directory)
+    arrays = fitting_arrays(source, read_arrays(path), path)
+    found = (file_sha256(path) if path.name == source.file_name
+             else read_about(path).get('source_sha256'))
+    if None not in (found, source.sha256) and found != source.sha256:
+        raise WeightsError(f'{path} comes from a file with the SHA-256 checksum {found}, '
+                           f'expected {source.sha256}; get the published file and import it')
+    return Verification(path, sum(array.size for array in arrays.values()), found)
 
 
 def fitting_arrays(source: WeightsSource, arrays: Mapping[str, np.ndarray],

@@ -18,7 +18,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 
@@ -28,9 +27,9 @@ from lmsco_ros.core.features.hog import hog
 from lmsco_ros.core.features.intensity_channels import intensity_channels
 from lmsco_ros.core.features.projection import Projection
 from lmsco_ros.core.fourier.interpolation import interpolate, interpolation_series
-from lmsco_ros.core.sections import ChannelConfig, FeatureConfig, NETWORK_KINDS, NetworkConfig
+from lmsco_ros.core.sections import ChannelConfig, FeatureConfig, NETWORK_KINDS
 
-__all__ = ['FeatureExtractor', 'hann_window', 'load_networks', 'normalize']
+__all__ = ['FeatureExtractor', 'hann_window', 'normalize']
 
 NetworkPass = Callable[[np.ndarray], Mapping[tuple[str, int], Array]]
 
@@ -54,7 +53,7 @@ class FeatureExtractor:
     config : TrackerConfig
         Names the blocks.
     networks : mapping of str to Backbone
-        What `load_networks` returns for the configuration.
+        By the kind of channels they show, as `load_networks` returns them.
     size : int
         Side of the patches in pixels, a multiple of every cell.
     backend : Backend
@@ -67,7 +66,7 @@ class FeatureExtractor:
         self._backend = backend
         self._blocks = [_make_block(block, size, backend) for block in config.features]
         self._passes = {kind: _make_pass(config, kind, networks[kind], size, backend)
-                        for kind in networks}
+                        for kind in NETWORK_KINDS if kind in networks}
 
     def __call__(self, patches: np.ndarray, flow: np.ndarray | None = None) -> list[Array]:
         """
@@ -122,33 +121,6 @@ class FeatureExtractor:
         count = self._passes[group.kind].channels(group.layer)
         return self._backend.asarray(
             np.zeros((len(patches), cells, cells, count), np.float32))
-
-
-def load_networks(config: TrackerConfig) -> dict[str, object]:
-    """
-    Load the networks that the blocks of a configuration need.
-
-    Returns
-    -------
-    dict of Backbone
-        By the kind of channels; empty where no block asks for one.
-
-    Raises
-    ------
-    WeightsError
-        When weights are missing or damaged; says how to get them.
-
-    """
-    return {kind: _load(config.networks, kind) for kind in NETWORK_KINDS
-            if _requests(config, kind)}
-
-
-def _load(config: NetworkConfig, kind: str) -> object:
-    """Load one network; torch is imported only where there is one."""
-    from lmsco_ros.core.backbones.weights import load_backbone
-
-    name = config.appearance_backbone if kind == 'appearance' else config.motion_backbone
-    return load_backbone(name, Path(config.directory) if config.directory else None)
 
 
 def _requests(config: TrackerConfig, kind: str) -> list[tuple[str, int]]:

@@ -43,6 +43,8 @@ class TrackingSequence:
         True boxes (x, y, width, height), 0-based; NaN rows where the target is absent.
     attributes : mapping of str to ndarray, shape (n,), bool
         Which frames show camera motion, occlusion and so on; empty where unknown.
+    challenge : str
+        What the sequence was made harder with; empty for a sequence as it was recorded.
 
     """
 
@@ -51,6 +53,7 @@ class TrackingSequence:
     frames: FrameSource
     ground_truth: npt.NDArray[np.float64]
     attributes: Mapping[str, npt.NDArray[np.bool_]] = field(default_factory=dict)
+    challenge: str = ''
 
     def __post_init__(self) -> None:
         """Refuse frames and ground truth that do not belong together."""

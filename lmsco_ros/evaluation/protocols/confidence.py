@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""How far a tracker's own word can be trusted: its score, and when it says LOST."""
+"""How far a tracker's own word can be trusted: its score, and when it says LOST or found."""
 
 from __future__ import annotations
 
@@ -22,11 +22,17 @@ from typing import Optional, Sequence
 import numpy as np
 import numpy.typing as npt
 
-from lmsco_ros.evaluation.geometry import Array
+from lmsco_ros.evaluation.geometry import Array, is_absent
+from lmsco_ros.evaluation.trace import Trace
 
 Flags = npt.NDArray[np.bool_]
 
 GOOD_OVERLAP = 0.5
+
+# Frames after its return in which a target counts as found again.
+RETURN_FRAMES = 30
+# Sizes of the target that it moves by from one frame to the next when it jumps, not flies.
+_JUMP_SIZES = 2.0
 
 
 @dataclass(frozen=True)
@@ -53,6 +59,36 @@ class LostFigures:
     false_alarms: int
     frames_present: int
     lost_while_present: int
+
+
+@dataclass(frozen=True)
+class ReturnFigures:
+    """
+    What was said in one sequence while the target was away, and after it was back.
+
+    A target returns when it is there after an absence, or jumps by more than two of its
+    sizes from one frame to the next. Returns that last for fewer than `RETURN_FRAMES` frames
+    do not count.
+
+    Attributes
+    ----------
+    absent : int
+        Frames without the target since the tracker was started.
+    claimed : int
+        Of these, frames for which a box was given and the state was not LOST.
+    delays : tuple of int or None
+        For each return: frames until a box, not LOST, overlapped the target by more than
+        `GOOD_OVERLAP`; None when that took `RETURN_FRAMES` or more.
+    mistaken : int
+        Returns after which, within `RETURN_FRAMES` and before the target was found again, a
+        box without any overlap was given while the state was not LOST.
+
+    """
+
+    absent: int
+    claimed: int
+    delays: tuple[Optional[int], ...]
+    mistaken: int
 
 
 def auroc_terms(scores: Sequence[Array], overlap: Sequence[Array]) -> tuple[Array, Array, Array]:
@@ -131,6 +167,51 @@ def lost_figures(lost: Flags, overlap: Array) -> LostFigures:
         false_alarms=len(false),
         frames_present=int((~absent).sum()),
         lost_while_present=int((lost & ~absent).sum()))
+
+
+def return_figures(ground_truth: Array, trace: Trace, overlap: Array) -> ReturnFigures:
+    """
+    Return how the absences and returns of the target went in one sequence.
+
+    Parameters
+    ----------
+    ground_truth : ndarray, shape (n, 4)
+        True boxes, NaN where absent.
+    trace : Trace
+        Answers of the tracker.
+    overlap : ndarray, shape (n,)
+        Overlap of the two for each frame; NaN where the target is absent.
+
+    """
+    absent = is_absent(ground_truth)
+    claimed = ~trace.lost & ~is_absent(trace.boxes)
+    started = np.arange(len(absent)) > (trace.starts[0] if trace.starts else 0)
+    outcomes = [_outcome(claimed[start:start + RETURN_FRAMES],
+                         overlap[start:start + RETURN_FRAMES])
+                for start in _returns(ground_truth, started)]
+    return ReturnFigures(
+        absent=int((absent & started).sum()),
+        claimed=int((absent & started & claimed).sum()),
+        delays=tuple(delay for delay, _ in outcomes),
+        mistaken=sum(mistaken for _, mistaken in outcomes))
+
+
+def _outcome(claimed: Flags, overlap: Array) -> tuple[Optional[int], bool]:
+    """Return the delay of a return, and whether a box was claimed elsewhere before."""
+    delay = _delay(claimed & (overlap > GOOD_OVERLAP))
+    return delay, bool((claimed & (overlap == 0))[:delay].any())
+
+
+def _returns(ground_truth: Array, started: Flags) -> list[int]:
+    """Return the first frame of each return that lasts long enough."""
+    absent = is_absent(ground_truth)
+    centers = ground_truth[:, :2] + ground_truth[:, 2:] / 2
+    steps = np.linalg.norm(np.diff(centers, axis=0), axis=1)
+    jumped = steps > _JUMP_SIZES * np.sqrt(np.prod(ground_truth[:-1, 2:], axis=1))
+    starts = np.flatnonzero(started[1:] & ~absent[1:] & (absent[:-1] | jumped)) + 1
+    ends = np.append(starts[1:], len(absent))
+    return [int(start) for start, end in zip(starts, ends)
+            if (~absent[start:end]).cumprod().sum() >= RETURN_FRAMES]
 
 
 def _absences(absent: Flags) -> list[tuple[int, int]]:

@@ -32,6 +32,8 @@ def command_line(run: EvaluationRun) -> str:
             words += [f'--{option}', str(context[option])]
     if context.get('sequences', '*') != '*':
         words += ['--sequences', context['sequences']]
+    for name in context.get('challenges', ()):
+        words += ['--challenge', name]
     for name in run.trackers:
         words += ['--tracker', name]
     words += ['--jobs', str(context.get('jobs', 1)), '--output', 'results']

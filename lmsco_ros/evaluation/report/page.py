@@ -27,6 +27,7 @@ from jinja2 import Environment, StrictUndefined
 from matplotlib.figure import Figure
 import numpy as np
 
+from lmsco_ros.evaluation.challenges import CHALLENGES
 from lmsco_ros.evaluation.datasets import TrackingSequence
 from lmsco_ros.evaluation.report.conditions import conditions, problems
 from lmsco_ros.evaluation.report.failures import worst_failures
@@ -37,10 +38,11 @@ from lmsco_ros.evaluation.report.pictures import (
 from lmsco_ros.evaluation.report.style import looks
 from lmsco_ros.evaluation.report.supervised_plots import supervised_plots
 from lmsco_ros.evaluation.report.tables import (
-    Cell, confidence_table, difference_rows, one_pass_table, Row, supervised_table, Table)
+    absence_table, Cell, confidence_table, difference_rows, one_pass_table, Row,
+    supervised_table, Table)
 from lmsco_ros.evaluation.run_file import EvaluationRun
 from lmsco_ros.evaluation.summaries.attributes import attribute_names, summarize_attributes
-from lmsco_ros.evaluation.summaries.confidence import summarize_confidence
+from lmsco_ros.evaluation.summaries.confidence import confidence_parts, summarize_confidence
 from lmsco_ros.evaluation.summaries.differences import differences
 from lmsco_ros.evaluation.summaries.one_pass import summarize_one_pass
 from lmsco_ros.evaluation.summaries.supervised import eao_interval, summarize_supervised
@@ -119,8 +121,27 @@ def _one_pass(run: EvaluationRun, folder: Path) -> dict[str, Any]:
         'plots': _save_plots(one_pass_plots(summaries), folder),
         'differences': difference_rows(differences(aucs, higher_is_better=True), 3),
         'attributes': _attributes(run, 'frames'),
-        'confidence': confidence_table(summarize_confidence(run)),
+        'challenges': _challenges(run, {item.tracker: item.aucs for item in summaries}),
+        'confidence': [_confidence(part, name) for name, part in confidence_parts(run)],
     }
+
+
+def _confidence(run: EvaluationRun, challenge: str) -> dict[str, Any]:
+    summaries = summarize_confidence(run)
+    title = f'{challenge}: {CHALLENGES[challenge].description}' if challenge else ''
+    return {'title': title, 'table': confidence_table(summaries),
+            'absence': absence_table(summaries)}
+
+
+def _challenges(run: EvaluationRun, aucs: Mapping[str, Any]) -> Optional[Table]:
+    """Return the mean success AUC under each challenge, with the number of sequences."""
+    marks = np.array([sequence.challenge for sequence in run.sequences])
+    rows = tuple(
+        Row(name, tuple(Cell(number(float(values[marks == challenge].mean())),
+                             str((marks == challenge).sum()))
+                        for challenge in run.challenges))
+        for name, values in aucs.items())
+    return Table(run.challenges, rows) if run.challenges else None
 
 
 def _supervised(run: EvaluationRun, folder: Path) -> dict[str, Any]:

@@ -95,9 +95,9 @@ def encode(picture: Picture, ending: str) -> bytes:
 def _display(image: npt.NDArray) -> Picture:
     """Return an 8-bit BGR view with the contrast of the scene."""
     if image.dtype != np.uint8 or image.ndim == 2:
-        low, high = np.percentile(image, (0.5, 99.5))
+        low, high = np.percentile(image[np.isfinite(image)], (0.5, 99.5))
         scaled = (image.astype(np.float32) - low) * (255 / max(float(high - low), 1e-6))
-        image = np.clip(scaled, 0, 255).astype(np.uint8)
+        image = np.clip(np.nan_to_num(scaled), 0, 255).astype(np.uint8)
     return cv2.cvtColor(image, cv2.COLOR_GRAY2BGR) if image.ndim == 2 else image
 
 

@@ -127,14 +127,27 @@ def supervised_table(summaries: Sequence[SupervisedSummary]) -> Table:
 
 
 def confidence_table(summaries: Sequence[ConfidenceSummary]) -> Table:
-    """Return the table of scores and LOST declarations."""
+    """Return the table of scores and of LOST while the target is there."""
     columns: tuple[_Column[ConfidenceSummary], ...] = (
         _Column('AUROC of the score', lambda item: item.auroc),
+        _Column('false LOST per 1000 frames', lambda item: item.false_alarms, 2, -1),
+        _Column('share of frames LOST', lambda item: item.lost_share, 3, 0))
+    return _table(columns, summaries, None)
+
+
+def absence_table(summaries: Sequence[ConfidenceSummary]) -> Optional[Table]:
+    """Return the table of targets that left and came back, None where none did."""
+    if not any(item.departures or item.absent or item.returns for item in summaries):
+        return None
+    columns: tuple[_Column[ConfidenceSummary], ...] = (
         _Column('targets that left', lambda item: _plain(item.departures), 0, 0),
         _Column('LOST declared', lambda item: _plain(item.declared), 0),
         _Column('median frames to LOST', lambda item: _plain(item.delay), 0, -1),
-        _Column('false LOST per 1000 frames', lambda item: item.false_alarms, 2, -1),
-        _Column('share of frames LOST', lambda item: item.lost_share, 3, 0))
+        _Column('share of absent frames claimed', lambda item: item.claimed_share, 3, -1),
+        _Column('returns', lambda item: _plain(item.returns), 0, 0),
+        _Column('found again', lambda item: item.found_share),
+        _Column('median frames to that', lambda item: _plain(item.found_delay), 0, -1),
+        _Column('returns with a claim elsewhere', lambda item: _plain(item.mistaken), 0, -1))
     return _table(columns, summaries, None)
 
 

@@ -22,7 +22,8 @@ from statistics import median
 import numpy as np
 
 from lmsco_ros.evaluation.protocols.bootstrap import Estimate, estimate, ratio_estimate
-from lmsco_ros.evaluation.protocols.confidence import auroc, auroc_terms, lost_figures
+from lmsco_ros.evaluation.protocols.confidence import (
+    auroc, auroc_terms, lost_figures, return_figures)
 from lmsco_ros.evaluation.run_file import EvaluationRun
 
 
@@ -45,6 +46,18 @@ class ConfidenceSummary:
         False declarations of LOST per 1000 frames with a target.
     lost_share : Estimate
         Share of the frames with a target that were spent in LOST, justified or not.
+    absent : int
+        Frames without the target.
+    claimed_share : Estimate
+        Share of these for which a box was claimed; NaN where the target never left.
+    returns, found : int
+        Times the target came back, and how often it was found again soon.
+    found_share : Estimate
+        The second as a share of the first.
+    found_delay : float
+        Median number of frames that took where it was found, else NaN.
+    mistaken : int
+        Returns after which a box elsewhere was claimed first.
 
     """
 
@@ -55,11 +68,23 @@ class ConfidenceSummary:
     delay: float
     false_alarms: Estimate
     lost_share: Estimate
+    absent: int
+    claimed_share: Estimate
+    returns: int
+    found: int
+    found_share: Estimate
+    found_delay: float
+    mistaken: int
 
 
 def summarize_confidence(run: EvaluationRun) -> tuple[ConfidenceSummary, ...]:
     """Return the summary of each tracker, in the order of the run."""
     return tuple(_summarize(run, name) for name in run.trackers)
+
+
+def confidence_parts(run: EvaluationRun) -> list[tuple[str, EvaluationRun]]:
+    """Return the parts of a run that are judged apart: one for each challenge, or all as one."""
+    return [(name, run.only(challenge=name)) for name in run.challenges] or [('', run)]
 
 
 def _summarize(run: EvaluationRun, name: str) -> ConfidenceSummary:
@@ -70,6 +95,10 @@ def _summarize(run: EvaluationRun, name: str) -> ConfidenceSummary:
     lost = [lost_figures(trace.lost, overlap) for trace, overlap in zip(traces, overlaps)]
     delays = [delay for figures in lost for delay in figures.delays]
     declared = [delay for delay in delays if delay is not None]
+    back = [return_figures(sequence.ground_truth, trace, overlap)
+            for sequence, trace, overlap in zip(run.sequences, traces, overlaps)]
+    found = [[delay for delay in figures.delays if delay is not None] for figures in back]
+    all_found = [delay for delays in found for delay in delays]
     present = np.array([figures.frames_present / 1000 for figures in lost])
     return ConfidenceSummary(
         tracker=name,
@@ -79,4 +108,12 @@ def _summarize(run: EvaluationRun, name: str) -> ConfidenceSummary:
         false_alarms=ratio_estimate(
             np.array([float(figures.false_alarms) for figures in lost]), present),
         lost_share=ratio_estimate(
-            np.array([figures.lost_while_present / 1000 for figures in lost]), present))
+            np.array([figures.lost_while_present / 1000 for figures in lost]), present),
+        absent=sum(figures.absent for figures in back),
+        claimed_share=ratio_estimate(np.array([float(figures.claimed) for figures in back]),
+                                     np.array([float(figures.absent) for figures in back])),
+        returns=sum(len(figures.delays) for figures in back), found=len(all_found),
+        found_share=ratio_estimate(np.array([float(len(delays)) for delays in found]),
+                                   np.array([float(len(figures.delays)) for figures in back])),
+        found_delay=median(all_found) if all_found else float('nan'),
+        mistaken=sum(figures.mistaken for figures in back))

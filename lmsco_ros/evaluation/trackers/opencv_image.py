@@ -26,7 +26,8 @@ class EightBitView:
     Map images of any depth to 8-bit BGR with the contrast of the first image.
 
     The mapping is fixed at the start, since a gain that follows the scene would make
-    the target flicker. 8-bit images pass unchanged.
+    the target flicker. 8-bit images pass unchanged; pixels without a finite value are black,
+    or white where they are infinitely warm.
 
     Parameters
     ----------
@@ -37,7 +38,8 @@ class EightBitView:
 
     def __init__(self, first: npt.NDArray) -> None:
         """Find the gain."""
-        low, high = (0.0, 255.0) if first.dtype == np.uint8 else np.percentile(first, (1, 99))
+        low, high = (0.0, 255.0) if first.dtype == np.uint8 else np.percentile(
+            first[np.isfinite(first)], (1, 99))
         self._gain = 255.0 / max(float(high - low), 1e-6)
         self._offset = -float(low) * self._gain
 
@@ -45,5 +47,5 @@ class EightBitView:
         """Return the view, shape (H, W, 3)."""
         if image.dtype != np.uint8:
             scaled = image.astype(np.float32) * self._gain + self._offset
-            image = np.clip(scaled, 0, 255).astype(np.uint8)
+            image = np.clip(np.nan_to_num(scaled), 0, 255).astype(np.uint8)
         return cv2.cvtColor(image, cv2.COLOR_GRAY2BGR) if image.ndim == 2 else image

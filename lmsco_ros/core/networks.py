@@ -1,0 +1,54 @@
+# Copyright 2026 lmsco_ros contributors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The networks that a configuration asks for."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from lmsco_ros.core.config import TrackerConfig
+from lmsco_ros.core.sections import NETWORK_KINDS
+
+__all__ = ['load_networks']
+
+
+def load_networks(config: TrackerConfig) -> dict[str, object]:
+    """
+    Load the networks that a configuration needs.
+
+    Returns
+    -------
+    dict of Backbone
+        By what they are for: `appearance`, `motion`, `registration`; empty where nothing asks
+        for one, so that torch is imported only where it is needed.
+
+    Raises
+    ------
+    WeightsError
+        When weights are missing or damaged; says how to get them.
+
+    """
+    wanted = {'appearance': config.networks.appearance_backbone,
+              'motion': config.networks.motion_backbone}
+    used = {group.kind for block in config.features for group in block.channels}
+    names = {kind: wanted[kind] for kind in NETWORK_KINDS if kind in used}
+    if config.registration.backbone:
+        names['registration'] = config.registration.backbone
+    if not names:
+        return {}
+    from lmsco_ros.core.backbones.weights import load_backbone
+
+    folder = Path(config.networks.directory) if config.networks.directory else None
+    return {kind: load_backbone(name, folder) for kind, name in names.items()}
