@@ -25,8 +25,9 @@ import time
 from typing import Protocol
 
 import numpy as np
-from safetensors.torch import save_file
 import torch
+
+from lmsco_ros.core.backbones.formats import write_arrays
 
 __all__ = ['Batch', 'Objective', 'Schedule', 'train']
 
@@ -141,9 +142,10 @@ def train(network: torch.nn.Module, objective: Objective, batches: Iterator[Batc
                               *_validate(network, objective, validation, device)])
                 stream.flush()
                 recent.clear()
-                save_file({name: value.contiguous().cpu()
-                           for name, value in network.state_dict().items()},
-                          output.parent / f'{output.name}.safetensors')
+                write_arrays(output.parent / f'{output.name}.safetensors',
+                             {name: value.cpu().numpy()
+                              for name, value in network.state_dict().items()},
+                             {'source': f'training/train.py, step {step}'})
             if progress >= 1:
                 break
             batch = upcoming.pop().result().to(device)

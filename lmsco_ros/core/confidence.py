@@ -24,7 +24,7 @@ import numpy as np
 from lmsco_ros.core.config import ConfidenceConfig
 from lmsco_ros.core.types import TrackState
 
-__all__ = ['ConfidenceMonitor', 'peak_to_sidelobe_ratio']
+__all__ = ['ConfidenceMonitor', 'Evidence', 'peak_to_sidelobe_ratio']
 
 
 def peak_to_sidelobe_ratio(grid: np.ndarray, exclude: int) -> float:
@@ -55,6 +55,25 @@ def peak_to_sidelobe_ratio(grid: np.ndarray, exclude: int) -> float:
     return float((grid[row, column] - mean) / deviation) if deviation > 0 else 0.0
 
 
+@dataclass(frozen=True)
+class Evidence:
+    """
+    What speaks for a detection.
+
+    Attributes
+    ----------
+    sharpness : float
+        Peak-to-sidelobe ratio of the score.
+    presence : float
+        Probability, by comparison with the first frame, that the target is there; 1 where
+        nothing is compared.
+
+    """
+
+    sharpness: float
+    presence: float = 1.0
+
+
 @dataclass
 class ConfidenceMonitor:
     """
@@ -81,25 +100,34 @@ class ConfidenceMonitor:
         """Return the sharpness as a part of the reference."""
         return sharpness / float(np.median(self._reference)) if self._reference else 1.0
 
-    def believable(self, sharpness: float) -> bool:
-        """Return whether a frame of this sharpness shows the target."""
-        lost = self._state is TrackState.LOST
-        return self.quality(sharpness) >= (self.config.found if lost else self.config.lost)
+    def convincing(self, evidence: Evidence) -> bool:
+        """Return whether a frame shows the target even where it was not expected."""
+        return (self.quality(evidence.sharpness) >= self.config.found
+                and evidence.presence >= self.config.present)
 
-    def judge(self, sharpness: float) -> TrackState:
+    def believable(self, evidence: Evidence) -> bool:
+        """Return whether a frame shows the target."""
+        if self._state is TrackState.LOST:
+            return self.convincing(evidence)
+        return (self.quality(evidence.sharpness) >= self.config.lost
+                and evidence.presence >= self.config.absent)
+
+    def judge(self, evidence: Evidence) -> TrackState:
         """Take note of a frame and return the state after it."""
-        if self.believable(sharpness):
+        if self.believable(evidence):
             self._misses = 0
-            certain = self.quality(sharpness) >= self.config.uncertain
+            certain = (self.quality(evidence.sharpness) >= self.config.uncertain
+                       and evidence.presence >= self.config.present)
             self._state = TrackState.TRACKING if certain else TrackState.UNCERTAIN
             if len(self._reference) < self.config.reference_frames:
-                self._reference.append(sharpness)
+                self._reference.append(evidence.sharpness)
         else:
             self._misses += 1
             lost = self._state is TrackState.LOST or self._misses >= self.config.lost_frames
             self._state = TrackState.LOST if lost else TrackState.UNCERTAIN
         return self._state
 
-    def score(self, sharpness: float) -> float:
-        """Return the trust in a frame, in [0, 1): 1 - exp(-2 quality)."""
-        return 1 - math.exp(-2 * max(self.quality(sharpness), 0.0))
+    def score(self, evidence: Evidence) -> float:
+        """Return the trust in a frame, in [0, 1): (1 - exp(-2 quality)) times the presence."""
+        sharp = 1 - math.exp(-2 * max(self.quality(evidence.sharpness), 0.0))
+        return sharp * evidence.presence

@@ -16,23 +16,42 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
+from typing import cast, TYPE_CHECKING
 
 from lmsco_ros.core.config import TrackerConfig
 from lmsco_ros.core.sections import NETWORK_KINDS
 
-__all__ = ['load_networks']
+if TYPE_CHECKING:
+    from lmsco_ros.core.backbones.backbone import Backbone
+    from lmsco_ros.core.backbones.registration import RegistrationNet
+
+__all__ = ['load_networks', 'Networks']
 
 
-def load_networks(config: TrackerConfig) -> dict[str, object]:
+@dataclass(frozen=True)
+class Networks:
     """
-    Load the networks that a configuration needs.
+    Networks in memory; None where the configuration needs none.
 
-    Returns
-    -------
-    dict of Backbone
-        By what they are for: `appearance`, `motion`, `registration`; empty where nothing asks
-        for one, so that torch is imported only where it is needed.
+    Attributes
+    ----------
+    appearance, motion : Backbone or None
+        Behind the feature channels of that kind.
+    registration : RegistrationNet or None
+        Compares the target with its first frame.
+
+    """
+
+    appearance: Backbone | None = None
+    motion: Backbone | None = None
+    registration: RegistrationNet | None = None
+
+
+def load_networks(config: TrackerConfig) -> Networks:
+    """
+    Load the networks that a configuration needs; torch is imported only if there is one.
 
     Raises
     ------
@@ -47,8 +66,10 @@ def load_networks(config: TrackerConfig) -> dict[str, object]:
     if config.registration.backbone:
         names['registration'] = config.registration.backbone
     if not names:
-        return {}
+        return Networks()
     from lmsco_ros.core.backbones.weights import load_backbone
 
     folder = Path(config.networks.directory) if config.networks.directory else None
-    return {kind: load_backbone(name, folder) for kind, name in names.items()}
+    found = {kind: load_backbone(name, folder) for kind, name in names.items()}
+    return Networks(found.get('appearance'), found.get('motion'),
+                    cast('RegistrationNet | None', found.get('registration')))

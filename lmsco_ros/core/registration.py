@@ -93,12 +93,14 @@ class Registration:
         dx, dy, width, height = answer[:4] - self._bias
         center = (box.center[0] + self._config.center_rate * float(dx) * box.width,
                   box.center[1] + self._config.center_rate * float(dy) * box.height)
-        limit = self._config.largest_step
-        factors = [math.exp(self._config.size_rate * min(max(float(change), -limit), limit))
-                   for change in (width, height)]
-        found = BoundingBox.from_center(
-            center, (box.width * factors[0], box.height * factors[1]))
+        found = BoundingBox.from_center(center, (
+            box.width * self._factor(float(width)), box.height * self._factor(float(height))))
         return Registered(found, 1 / (1 + math.exp(-float(answer[4]))))
+
+    def _factor(self, change: float) -> float:
+        """Return the factor of a side, given the logarithm of the change that was seen."""
+        excess = max(abs(change) - self._config.tolerance, 0.0)
+        return math.exp(self._config.size_rate * math.copysign(excess, change))
 
     def _encode(self, view: FrameView, box: BoundingBox) -> object:
         """Return the encoding of the region around a box."""

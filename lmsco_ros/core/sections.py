@@ -324,21 +324,21 @@ class RegistrationConfig:
         Name of the weights of the network that compares; empty for no registration.
     center_rate, size_rate : float
         Part of the way that the box follows what the network says in one frame.
-    largest_step : float
-        Logarithm of the largest factor of width or height that is believed.
+    tolerance : float
+        Change of a side, as a logarithm, that is left to the scale estimator.
 
     """
 
     backbone: str = ''
-    center_rate: float = 1.0
+    center_rate: float = 0.5
     size_rate: float = 0.5
-    largest_step: float = 0.2
+    tolerance: float = 0.15
 
     def __post_init__(self) -> None:
         """Check the ranges."""
         check_range(self, 'center_rate', 0, 1)
         check_range(self, 'size_rate', 0, 1)
-        check_range(self, 'largest_step', 0, 2)
+        check_range(self, 'tolerance', 0, 2)
 
 
 @dataclass(frozen=True)
@@ -357,6 +357,9 @@ class ConfidenceConfig:
         Frames in a row below `lost` until the state is LOST.
     found : float
         Sharpness, as a part of the reference, from which a LOST target counts as found.
+    absent, present : float
+        Probability of presence below which a frame is not believed, and from which the state is
+        TRACKING or a LOST target counts as found.
     tiles : int
         Other regions of the image that are searched per frame while the target is missing.
 
@@ -367,6 +370,8 @@ class ConfidenceConfig:
     lost: float = 0.15
     lost_frames: int = 5
     found: float = 0.4
+    absent: float = 0.1
+    present: float = 0.5
     tiles: int = 4
 
     def __post_init__(self) -> None:
@@ -376,6 +381,8 @@ class ConfidenceConfig:
         check_range(self, 'uncertain', self.lost, 1)
         check_range(self, 'found', self.lost, 2)
         check_range(self, 'lost_frames', 1, 1000)
+        check_range(self, 'absent', 0, 1)
+        check_range(self, 'present', self.absent, 1)
         check_range(self, 'tiles', 0, 64)
 
 

@@ -93,7 +93,7 @@ class LMSCOTracker:
         """
         check_image(image)
         self._track = Track(self.config, self._backend, self._networks, image, box)
-        return self._track.first_result()
+        return self._track.result
 
     def update(self, image: np.ndarray) -> TrackResult:
         """

@@ -16,8 +16,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -27,11 +28,16 @@ from lmsco_ros.core.features.hog import hog
 from lmsco_ros.core.features.intensity_channels import intensity_channels
 from lmsco_ros.core.features.projection import Projection
 from lmsco_ros.core.fourier.interpolation import interpolate, interpolation_series
+from lmsco_ros.core.networks import Networks
 from lmsco_ros.core.sections import ChannelConfig, FeatureConfig, NETWORK_KINDS
+
+if TYPE_CHECKING:
+    from lmsco_ros.core.features.network_channels import NetworkChannels
 
 __all__ = ['FeatureExtractor', 'hann_window', 'normalize']
 
-NetworkPass = Callable[[np.ndarray], Mapping[tuple[str, int], Array]]
+Maps = Mapping[tuple[str, int], Array]
+"""Channels of a network by layer and side of the cells."""
 
 
 @dataclass(frozen=True)
@@ -52,8 +58,8 @@ class FeatureExtractor:
     ----------
     config : TrackerConfig
         Names the blocks.
-    networks : mapping of str to Backbone
-        By the kind of channels they show, as `load_networks` returns them.
+    networks : Networks
+        As `load_networks` returns them for the configuration.
     size : int
         Side of the patches in pixels, a multiple of every cell.
     backend : Backend
@@ -61,12 +67,11 @@ class FeatureExtractor:
 
     """
 
-    def __init__(self, config: TrackerConfig, networks: Mapping[str, object], size: int,
+    def __init__(self, config: TrackerConfig, networks: Networks, size: int,
                  backend: Backend) -> None:
         self._backend = backend
         self._blocks = [_make_block(block, size, backend) for block in config.features]
-        self._passes = {kind: _make_pass(config, kind, networks[kind], size, backend)
-                        for kind in NETWORK_KINDS if kind in networks}
+        self._passes = _make_passes(config, networks, size, backend)
 
     def __call__(self, patches: np.ndarray, flow: np.ndarray | None = None) -> list[Array]:
         """
@@ -87,11 +92,11 @@ class FeatureExtractor:
 
         """
         inputs = {'appearance': patches, 'motion': flow}
-        maps = {kind: None if inputs[kind] is None else run(inputs[kind])
-                for kind, run in self._passes.items()}
+        maps = {kind: run(given) for kind, run in self._passes.items()
+                if (given := inputs[kind]) is not None}
         return [self._series(block, patches, maps) for block in self._blocks]
 
-    def _series(self, block: _Block, patches: np.ndarray, maps: Mapping[str, Mapping | None]
+    def _series(self, block: _Block, patches: np.ndarray, maps: Mapping[str, Maps]
                 ) -> Array:
         """Return the series of one block."""
         groups = [group.weight * normalize(self._channels(group, block.config.cell, patches, maps))
@@ -103,13 +108,12 @@ class FeatureExtractor:
         return interpolate(xp.permute_dims(channels, (1, 2, 0, 3)) * block.window, block.kernel)
 
     def _channels(self, group: ChannelConfig, cell: int, patches: np.ndarray,
-                  maps: Mapping[str, Mapping | None]) -> Array:
+                  maps: Mapping[str, Maps]) -> Array:
         """Return a group of channels, shape (n, N, N, C)."""
         if group.kind in NETWORK_KINDS:
-            found = maps[group.kind]
-            if found is None:
+            if group.kind not in maps:
                 return self._silence(group, cell, patches)
-            return self._backend.asarray(found[group.layer, cell])
+            return self._backend.asarray(maps[group.kind][group.layer, cell])
         if group.kind == 'hog':
             return self._backend.asarray(hog(patches, cell))
         return self._backend.asarray(
@@ -129,12 +133,17 @@ def _requests(config: TrackerConfig, kind: str) -> list[tuple[str, int]]:
             for group in block.channels if group.kind == kind]
 
 
-def _make_pass(config: TrackerConfig, kind: str, network: object, size: int,
-               backend: Backend) -> NetworkPass:
-    """Return the pass through the network of a kind that serves all blocks."""
+def _make_passes(config: TrackerConfig, networks: Networks, size: int,
+                 backend: Backend) -> dict[str, NetworkChannels]:
+    """Return, for each kind of network channels, the pass that serves all blocks."""
+    found = {'appearance': networks.appearance, 'motion': networks.motion}
+    used = {kind: network for kind, network in found.items() if network is not None}
+    if not used:
+        return {}
     from lmsco_ros.core.features.network_channels import NetworkChannels
 
-    return NetworkChannels(network, kind, _requests(config, kind), size, backend)
+    return {kind: NetworkChannels(network, kind, _requests(config, kind), size, backend)
+            for kind, network in used.items()}
 
 
 def _make_block(config: FeatureConfig, size: int, backend: Backend) -> _Block:

@@ -96,12 +96,12 @@ class NetworkChannels:
 
     def _cells(self, maps: torch.Tensor, layer: str, cell: int) -> Array:
         """Return what a map shows of the patch itself, averaged over cells, channels last."""
-        stride = self._network.layers[layer].stride
-        first = round((self._network.margin - self._network.layers[layer].offset) / stride)
-        shown = slice(first, first + self._size // stride)
-        maps = maps[:, :, shown, shown]
-        if cell > stride:
-            maps = torch.nn.functional.avg_pool2d(maps, cell // stride)
+        found = self._network.layers[layer]
+        first = found.first_cell(self._network.margin)
+        inside = slice(first, first + self._size // cell * cell // found.stride)
+        maps = maps[:, :, inside, inside]
+        if cell > found.stride:
+            maps = torch.nn.functional.avg_pool2d(maps, cell // found.stride)
         channels = maps.permute(0, 2, 3, 1).contiguous()
         return channels.numpy() if self._device.type == 'cpu' else channels
 

@@ -36,7 +36,9 @@ class DenseFlow:
     """
 
     def __init__(self) -> None:
-        self._search = cv2.DISOpticalFlow_create(cv2.DISOPTICAL_FLOW_PRESET_ULTRAFAST)
+        # OpenCV's annotations lack what its video module creates.
+        self._search = cv2.DISOpticalFlow_create(  # type: ignore[attr-defined]
+            cv2.DISOPTICAL_FLOW_PRESET_ULTRAFAST)
 
     def __call__(self, before: np.ndarray, after: np.ndarray) -> np.ndarray:
         """
