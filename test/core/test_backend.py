@@ -30,6 +30,7 @@ from lmsco_ros.core.features.extractor import FeatureExtractor
 from lmsco_ros.core.fourier.localization import centered_map, locate
 from lmsco_ros.core.fourier.series import shift
 from lmsco_ros.core.learning.structured_operator import StructuredOperator
+from lmsco_ros.core.networks import Networks
 
 TOLERANCE = {'float32': 1e-4, 'float64': 1e-9}
 FEATURES = (FeatureConfig((ChannelConfig('hog'), ChannelConfig('intensity', 2.0)), cell=4),
@@ -48,7 +49,7 @@ def track_once(backend, learning):
     """Learn two patches and find a third: scores, filters, objective and peak."""
     rng = np.random.default_rng(5)
     patch = rng.normal(size=(72, 72)).astype(np.float32)
-    extractor = FeatureExtractor(TrackerConfig(features=FEATURES), {}, 72, backend)
+    extractor = FeatureExtractor(TrackerConfig(features=FEATURES), Networks(), 72, backend)
     samples = extractor(np.stack([patch, np.roll(patch, (4, -8), axis=(0, 1))]))
     sample = [block[:, :, 0] for block in samples]
     operator = StructuredOperator(learning, sample, (0.2, 0.25), backend)
@@ -89,7 +90,8 @@ def test_torch_gives_the_result_of_numpy(dtype, anchor, solve):
 def test_running_precision_is_kept(dtype):
     backend = Backend(numpy_namespace, 'cpu', dtype)
     patch = np.random.default_rng(5).normal(size=(36, 36)).astype(np.float32)
-    block, = FeatureExtractor(TrackerConfig(features=FEATURES[:1]), {}, 36, backend)(patch[None])
+    config = TrackerConfig(features=FEATURES[:1])
+    block, = FeatureExtractor(config, Networks(), 36, backend)(patch[None])
     operator = StructuredOperator(LearningConfig(initial_iterations=2), [block[:, :, 0]],
                                   (0.2, 0.2), backend)
     assert block.dtype == operator.filters[0].dtype == backend.complex

@@ -23,7 +23,7 @@ import yaml
 from lmsco_ros.core import ConfigError, TrackerConfig
 from lmsco_ros.core.config import (
     ChannelConfig, ConfidenceConfig, FeatureConfig, IntensityConfig, LearningConfig, MotionConfig,
-    NetworkConfig, RuntimeConfig, SamplingConfig, ScaleConfig)
+    NetworkConfig, RegistrationConfig, RuntimeConfig, SamplingConfig, ScaleConfig)
 
 weights = st.floats(0.01, 100)
 words = st.text(st.characters(codec='utf-8', exclude_categories=['Cc', 'Cs']), min_size=1)
@@ -34,7 +34,8 @@ features = st.builds(
     cell=st.sampled_from([2, 4, 8]), projection=st.integers(0, 4096))
 configs = st.builds(
     TrackerConfig,
-    features=st.lists(features, min_size=1, max_size=3).map(tuple),
+    features=st.lists(features, min_size=1, max_size=3).map(tuple).filter(
+        lambda blocks: {group.kind for block in blocks for group in block.channels} != {'motion'}),
     intensity=st.builds(IntensityConfig, low_percentile=st.floats(0, 49),
                         high_percentile=st.floats(51, 100), jump=st.floats(0, 1)),
     sampling=st.builds(SamplingConfig, search_factor=st.floats(1.5, 10),
@@ -42,6 +43,8 @@ configs = st.builds(
                        patch_size_max=st.integers(200, 1024)),
     networks=st.builds(NetworkConfig, words, words, words | st.just('')),
     motion=st.builds(MotionConfig, st.booleans(), st.floats(0, 100)),
+    registration=st.builds(RegistrationConfig, words | st.just(''), st.floats(0, 1),
+                           st.floats(0, 1), st.floats(0, 2)),
     learning=st.builds(LearningConfig, anchor=st.sampled_from(['unit', 'coupled', 'frozen']),
                        solve=st.sampled_from(['joint', 'per_block']), core=st.floats(0, 1),
                        window_minimum=st.floats(1e-6, 1), window_edge=st.floats(1, 1e3),
@@ -50,7 +53,8 @@ configs = st.builds(
                     step=st.floats(1.001, 1.15), exponent_min=st.integers(-9, 0),
                     exponent_max=st.integers(0, 9)),
     confidence=st.builds(ConfidenceConfig, lost=st.floats(0, 0.1),
-                         uncertain=st.floats(0.1, 1), found=st.floats(0.1, 2)),
+                         uncertain=st.floats(0.1, 1), found=st.floats(0.1, 2),
+                         absent=st.floats(0, 0.3), present=st.floats(0.3, 1)),
     runtime=st.builds(RuntimeConfig, device=st.sampled_from(['cpu', 'cuda', 'cuda:1']),
                       threads=st.integers(1, 256)),
     newton_steps=st.integers(0, 100))
@@ -211,6 +215,9 @@ BOUNDS = [
     (ScaleConfig, 'model_area', 63, 65537), (ScaleConfig, 'padding', 0.9, 4.1),
     (ScaleConfig, 'regularization', 0, 101), (ScaleConfig, 'label_sigma', 0, 51),
     (MotionConfig, 'least_motion', -0.1, 101),
+    (RegistrationConfig, 'center_rate', -0.1, 1.1), (RegistrationConfig, 'size_rate', -0.1, 1.1),
+    (RegistrationConfig, 'tolerance', -0.1, 2.1), (ConfidenceConfig, 'absent', -0.1, 1.1),
+    (ConfidenceConfig, 'present', 0, 1.1),
     (ConfidenceConfig, 'reference_frames', 0, 1001), (ConfidenceConfig, 'lost_frames', 0, 1001),
     (ConfidenceConfig, 'tiles', -1, 65), (RuntimeConfig, 'threads', 0, 257),
     (TrackerConfig, 'newton_steps', -1, 101),
@@ -231,6 +238,7 @@ def test_bounds_name_the_field_the_value_and_the_range(kind, name, low, high):
     {'learning': {'window_minimum': 0.5, 'window_edge': 0.1}},
     {'confidence': {'lost': 0.5, 'uncertain': 0.3, 'found': 0.6}},
     {'confidence': {'lost': 0.5, 'uncertain': 0.6, 'found': 0.3}},
+    {'confidence': {'absent': 0.5, 'present': 0.3}},
 ])
 def test_ranges_must_not_be_turned_round(values):
     with pytest.raises(ConfigError, match='expected a value in'):
@@ -242,6 +250,8 @@ def test_ranges_must_not_be_turned_round(values):
       'features': [{'channels': [{'kind': 'hog'}], 'cell': 16}]}, '64 pixels .* cells of 16'),
     ({'features': [{'channels': [{'kind': 'hog'}], 'cell': cell} for cell in (7, 11)]},
      'cells of 77 pixels'),
+    ({'features': [{'channels': [{'kind': 'motion', 'layer': 'deep'}], 'cell': 16}]},
+     'motion channels only, which show nothing in the first frame; add a block of appearance'),
     ({'scale': {'step': 2, 'exponent_max': 50}}, 'reach a factor of 1.1259e\\+15'),
 ])
 def test_values_that_do_not_go_together_are_refused(values, words):

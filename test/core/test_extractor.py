@@ -25,7 +25,9 @@ from lmsco_ros.core.features.hog import hog
 from lmsco_ros.core.features.intensity_channels import intensity_channels
 from lmsco_ros.core.fourier.interpolation import interpolation_series
 from lmsco_ros.core.fourier.series import analyze, mean_of_squares
+from lmsco_ros.core.networks import Networks
 
+PLAIN = FeatureConfig((ChannelConfig('intensity'),), 4)
 BOTH = (
     FeatureConfig((ChannelConfig('appearance', layer='features'), ChannelConfig('hog', 0.5)), 4),
     FeatureConfig((ChannelConfig('appearance', layer='conv1'),), 8, projection=6),
@@ -42,7 +44,7 @@ def extractor(backend, size, *blocks, networks=()):
     """Return the extractor of some blocks, with those of the networks that they need."""
     used = {group.kind for block in blocks for group in block.channels}
     needed = {kind: networks[kind] for kind in networks if kind in used}
-    return FeatureExtractor(TrackerConfig(features=blocks), needed, size, backend)
+    return FeatureExtractor(TrackerConfig(features=blocks), Networks(**needed), size, backend)
 
 
 def textures(rng, count, size):
@@ -126,7 +128,7 @@ def test_groups_share_a_block_at_equal_strength(backend, rng, networks):
     together, = extractor(backend, 60, FeatureConfig(groups, 4), networks=networks)(patches, flow)
     parts = np.split(together, np.cumsum([31, 2, 48]), axis=-1)
     for group, part in zip(groups, parts, strict=True):
-        alone, = extractor(backend, 60, FeatureConfig((group,), 4), networks=networks)(
+        alone, _ = extractor(backend, 60, FeatureConfig((group,), 4), PLAIN, networks=networks)(
             patches, flow)
         np.testing.assert_allclose(part, alone, atol=1e-6)
         assert 0.01 < mean_of_squares(part).mean() < 1
@@ -146,10 +148,10 @@ def test_no_motion_leaves_zeros_in_the_motion_block_alone(backend, rng, networks
 def test_projection_of_a_motion_block_waits_for_motion(backend, rng, networks):
     block = FeatureConfig((ChannelConfig('motion', layer='deep'),), 8, projection=5)
     patches, flow = textures(rng, 1, 72), flows(rng, 1, 72)
-    late = extractor(backend, 72, block, networks=networks)
-    silent, = late(patches)
+    late = extractor(backend, 72, block, PLAIN, networks=networks)
+    silent, _ = late(patches)
     assert silent.shape == (9, 5, 1, 5) and not silent.any()
-    at_once = extractor(backend, 72, block, networks=networks)
+    at_once = extractor(backend, 72, block, PLAIN, networks=networks)
     np.testing.assert_array_equal(late(patches, flow)[0], at_once(patches, flow)[0])
 
 

@@ -153,15 +153,15 @@ def test_target_is_lost_and_found_again_elsewhere(make_scene, elsewhere):
         assert result.state is TrackState.TRACKING
     trusted = result.box
     states = []
-    for _ in range(5):
-        gone = tracker.update(scene.frame())
+    for n in range(5):
+        gone = tracker.update(scene.frame(pan=(n / 10, 0)))
         states.append(gone.state)
     assert TrackState.TRACKING not in states[1:]
     assert states[-1] is TrackState.LOST
     assert gone.box.overlap(trusted) > 0.5
     assert gone.score < 0.5 * result.score + 0.25
-    for _ in range(6):
-        back = tracker.update(scene.frame(elsewhere))
+    for n in range(6):
+        back = tracker.update(scene.frame(elsewhere, pan=(n / 10, 0)))
     assert back.state is TrackState.TRACKING
     assert back.box.center == pytest.approx(elsewhere, abs=1.0)
 
