@@ -36,6 +36,7 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
+from msg_adapters.compressed_size import declared_size, JPEG_START, PNG_START
 from msg_adapters.errors import ImageMessageError
 
 if TYPE_CHECKING:
@@ -53,8 +54,9 @@ ENCODINGS = MappingProxyType({
     'rgb8': (np.dtype(np.uint8), 3),
 })
 _NATIVE_IS_BIG_ENDIAN = sys.byteorder == 'big'
-_PNG_START, _PNG_END = b'\x89PNG', b'IEND\xaeB`\x82'
-_JPEG_START, _JPEG_END = b'\xff\xd8', b'\xff\xd9'
+_PNG_END, _JPEG_END = b'IEND\xaeB`\x82', b'\xff\xd9'
+# A small file may unfold to gigabytes; thermal sensors stay far below this.
+_MOST_COMPRESSED_PIXELS = 2 ** 26
 
 
 def image_from_message(message: Image) -> npt.NDArray:
@@ -145,12 +147,13 @@ def image_from_compressed(message: CompressedImage) -> npt.NDArray:
     Raises
     ------
     ImageMessageError
-        When the data is neither jpeg nor png, is incomplete or damaged, or holds
-        another kind of pixels.
+        When the data is neither jpeg nor png, is incomplete or damaged, holds another
+        kind of pixels, or more of them than a camera sends.
 
     """
     data = np.frombuffer(message.data, np.uint8)
     _check_complete(data, message.format)
+    _check_declared_size(data, message.format)
     try:
         pixels = cv2.imdecode(data, cv2.IMREAD_UNCHANGED)
     except cv2.error as error:
@@ -249,9 +252,9 @@ def _fitting_encoding(image: npt.NDArray, encoding: str) -> str:
 def _check_complete(data: npt.NDArray[np.uint8], declared: str) -> None:
     """Refuse data that is no jpeg or png file, or one without its end."""
     start, end = data[:4].tobytes(), data[-64:].tobytes().rstrip(b'\0')
-    if start == _PNG_START:
+    if start == PNG_START:
         complete = end.endswith(_PNG_END)
-    elif start.startswith(_JPEG_START):
+    elif start.startswith(JPEG_START):
         complete = end.endswith(_JPEG_END)
     else:
         raise ImageMessageError(
@@ -262,6 +265,15 @@ def _check_complete(data: npt.NDArray[np.uint8], declared: str) -> None:
         raise ImageMessageError(
             f'compressed image (format "{declared}", {data.size} bytes) is truncated; expected '
             'a whole jpeg or png file: check the driver and the transport')
+
+
+def _check_declared_size(data: npt.NDArray[np.uint8], declared: str) -> None:
+    """Refuse a file that would take more memory than any camera's image."""
+    width, height = declared_size(memoryview(data)) or (0, 0)
+    if width * height > _MOST_COMPRESSED_PIXELS:
+        raise ImageMessageError(
+            f'compressed image (format "{declared}", {data.size} bytes) claims {width} x {height} '
+            f'pixels; expected at most {_MOST_COMPRESSED_PIXELS}: send smaller frames')
 
 
 def _byte_array(values: npt.NDArray) -> array:

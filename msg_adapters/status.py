@@ -19,6 +19,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from enum import IntEnum
+from typing import NamedTuple
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from std_msgs.msg import Header
@@ -46,6 +47,23 @@ class Diagnosis:
     hardware_id: str = ''
 
 
+class FrameTimes(NamedTuple):
+    """When a frame passed each station, in seconds since 1970 on the system's clock."""
+
+    received: float
+    started: float
+    finished: float
+    published: float
+
+
+class Reading(NamedTuple):
+    """Lowest, mean and highest value of the pixels of a target."""
+
+    minimum: float
+    mean: float
+    maximum: float
+
+
 @dataclass(frozen=True)
 class FrameStatus:
     """
@@ -60,7 +78,7 @@ class FrameStatus:
     score : float or None
         Trust in the box, in [0, 1]; None without a box.
     latency_ms : float
-        From the arrival of the frame to the answer, in milliseconds.
+        From the arrival of the frame until its box was published, in milliseconds.
     tracker_ms : float
         The tracker's own share of it, in milliseconds.
     dropped_frames : int
@@ -68,6 +86,12 @@ class FrameStatus:
     level : Level
     message : str
         For people: what is wrong and what to do, or the state.
+    times : FrameTimes or None
+        None for a message that was not tracked.
+    target : Reading or None
+        Of the pixels under the box, in the units of the image; None without a box.
+    target_celsius : Reading or None
+        The same in degrees Celsius; None where that is not known.
 
     """
 
@@ -79,6 +103,14 @@ class FrameStatus:
     dropped_frames: int
     level: Level = Level.OK
     message: str = ''
+    times: FrameTimes | None = None
+    target: Reading | None = None
+    target_celsius: Reading | None = None
+
+
+# Prefix of the keys in the message, attribute of FrameStatus and its type.
+_GROUPS = (('', 'times', FrameTimes), ('target_', 'target', Reading),
+           ('target_celsius_', 'target_celsius', Reading))
 
 
 def message_from_diagnoses(diagnoses: Iterable[Diagnosis],
@@ -110,15 +142,21 @@ def diagnoses_from_message(message: DiagnosticArray) -> list[Diagnosis]:
 def message_from_status(status: FrameStatus, name: str,
                         header: Header | None = None) -> DiagnosticArray:
     """Return the status of one frame, under the name of the node that says it."""
-    score = '' if status.score is None else repr(float(status.score))
-    return message_from_diagnoses([Diagnosis(name, status.level, status.message, {
+    values = {
         'state': status.state,
         'track_id': str(status.track_id),
-        'score': score,
+        'score': '' if status.score is None else repr(float(status.score)),
         'latency_ms': repr(float(status.latency_ms)),
         'tracker_ms': repr(float(status.tracker_ms)),
         'dropped_frames': str(status.dropped_frames),
-    })], header)
+    }
+    for prefix, attribute, _ in _GROUPS:
+        group = getattr(status, attribute)
+        if group is not None:
+            values |= {prefix + key: repr(float(value))
+                       for key, value in group._asdict().items()}
+    return message_from_diagnoses(
+        [Diagnosis(name, status.level, status.message, values)], header)
 
 
 def status_from_message(message: DiagnosticArray) -> FrameStatus:
@@ -139,11 +177,20 @@ def status_from_message(message: DiagnosticArray) -> FrameStatus:
             values['state'], int(values['track_id']),
             float(values['score']) if values['score'] else None,
             float(values['latency_ms']), float(values['tracker_ms']),
-            int(values['dropped_frames']), diagnosis.level, diagnosis.message)
+            int(values['dropped_frames']), diagnosis.level, diagnosis.message,
+            **{attribute: _group(values, prefix, kind) for prefix, attribute, kind in _GROUPS})
     except (KeyError, ValueError) as error:
         raise StatusMessageError(
             f'the message is no frame status ({error}); expected one entry with state, '
             'track_id, score, latency_ms, tracker_ms and dropped_frames') from error
+
+
+def _group(values: Mapping[str, str], prefix: str,
+           kind: type[FrameTimes] | type[Reading]) -> FrameTimes | Reading | None:
+    """Return the numbers that belong together; None when they are not there."""
+    if prefix + kind._fields[0] not in values:
+        return None
+    return kind(*(float(values[prefix + key]) for key in kind._fields))
 
 
 def _level(status: DiagnosticStatus) -> Level:

@@ -20,15 +20,17 @@ from collections import deque
 from collections.abc import Callable
 import threading
 import time
+from typing import NamedTuple
 
 import numpy as np
 
 from lmsco_ros.core.types import TrackState
-from lmsco_ros.node.worker import Outcome, Phase
-from msg_adapters.status import Diagnosis, FrameStatus, Level
+from lmsco_ros.node.outcome import Outcome, Phase
+from msg_adapters.status import Diagnosis, FrameStatus, FrameTimes, Level, Reading
 
 # Latencies of the last ten seconds at 30 Hz.
 _WINDOW = 300
+_PERCENTILES = (50, 95, 99)
 _LEVELS = {Phase.IDLE: Level.OK, Phase.DISABLED: Level.OK, Phase.REFUSED: Level.ERROR,
            Phase.FAILED: Level.ERROR}
 _MESSAGES = {
@@ -40,8 +42,31 @@ _MESSAGES = {
 }
 
 
-def frame_status(outcome: Outcome, dropped_frames: int) -> FrameStatus:
-    """Return what ~/status says about one frame."""
+class Problem(NamedTuple):
+    """What is wrong at the moment."""
+
+    level: Level
+    message: str
+
+
+def frame_status(outcome: Outcome, dropped_frames: int, published: float, *,
+                 target: Reading | None = None,
+                 target_celsius: Reading | None = None) -> FrameStatus:
+    """
+    Return what ~/status says about one frame.
+
+    Parameters
+    ----------
+    outcome : Outcome
+        Of the frame.
+    dropped_frames : int
+        Of the worker.
+    published : float
+        When the box went out, on the clock of `time.monotonic`.
+    target, target_celsius : Reading or None
+        Of the pixels under the box.
+
+    """
     result, phase = outcome.result, outcome.phase
     if result is None:
         state, level = phase.value, _LEVELS[phase]
@@ -49,10 +74,13 @@ def frame_status(outcome: Outcome, dropped_frames: int) -> FrameStatus:
     else:
         state, message = result.state.value, _MESSAGES[result.state]
         level = Level.OK if result.state is TrackState.TRACKING else Level.WARN
+    stations = (outcome.frame.received, outcome.started, outcome.finished, published)
+    since_1970 = time.time() - time.monotonic()
     return FrameStatus(
         state, outcome.track_id, None if result is None else float(result.score),
-        outcome.latency_seconds * 1e3, outcome.tracker_seconds * 1e3, dropped_frames,
-        level, message)
+        (published - outcome.frame.received) * 1e3, (outcome.finished - outcome.started) * 1e3,
+        dropped_frames, level, message, FrameTimes(*(since_1970 + at for at in stations)),
+        target, target_celsius)
 
 
 def refused_status(reason: str, track_id: int, dropped_frames: int) -> FrameStatus:
@@ -81,6 +109,7 @@ class HealthMonitor:
         self._counts = dict.fromkeys(('received', 'tracked', 'refused', 'tracker_errors',
                                       'backward_stamps'), 0)
         self._last_error = ''
+        self._warning = ''
         self._state = Phase.IDLE.value
         self.restart()
 
@@ -109,6 +138,11 @@ class HealthMonitor:
             self._last_error = reason
             self._state = Phase.REFUSED.value
 
+    def warned(self, warning: str) -> None:
+        """Remember what stays wrong until the node is configured again; empty forgets it."""
+        with self._lock:
+            self._warning = warning
+
     def answered(self, outcome: Outcome) -> None:
         """Note what became of a frame."""
         with self._lock:
@@ -118,15 +152,19 @@ class HealthMonitor:
             self._last_error = outcome.error or self._last_error
             self._state = (outcome.phase if outcome.result is None
                            else outcome.result.state).value
+
+    def published(self, outcome: Outcome, at: float) -> None:
+        """Note when the answer to a frame went out, on the clock of `time.monotonic`."""
+        with self._lock:
             if outcome.live:
-                self._latencies.append(outcome.latency_seconds)
+                self._latencies.append(at - outcome.frame.received)
 
     def silence(self) -> float:
         """Return the seconds since the last image, or since the node began to wait."""
         with self._lock:
             return self._clock() - self._waiting_since
 
-    def report(self, name: str, *, warning: str, dropped_frames: int) -> Diagnosis:
+    def report(self, name: str, *, problem: Problem | None, dropped_frames: int) -> Diagnosis:
         """
         Sum up.
 
@@ -134,36 +172,30 @@ class HealthMonitor:
         ----------
         name : str
             Who is meant.
-        warning : str
+        problem : Problem or None
             What is wrong at the moment, if anything is.
         dropped_frames : int
             Of the worker.
 
         """
         with self._lock:
-            p50, p95 = np.percentile(self._latencies or [0.0], [50, 95]) * 1e3
+            percentiles = np.percentile(self._latencies or [0.0], _PERCENTILES) * 1e3
             values = {'state': self._state, 'image_rate_hz': f'{self._rate():.1f}'}
             values |= {key: str(count) for key, count in self._counts.items()}
-            values |= {'dropped_frames': str(dropped_frames),
-                       'latency_p50_ms': f'{p50:.2f}', 'latency_p95_ms': f'{p95:.2f}',
-                       'last_error': self._last_error}
-        if values['state'] == Phase.REFUSED.value:
-            return Diagnosis(name, Level.ERROR, warning or values['last_error'], values)
-        level = Level.WARN if warning else Level.OK
-        return Diagnosis(name, level, warning or values['state'], values)
+            values |= {'dropped_frames': str(dropped_frames)}
+            values |= {f'latency_p{percentile}_ms': f'{value:.2f}'
+                       for percentile, value in zip(_PERCENTILES, percentiles)}
+            values |= {'last_error': self._last_error}
+            warning = self._warning
+        if problem is None and values['state'] == Phase.REFUSED.value:
+            problem = Problem(Level.ERROR, values['last_error'])
+        if problem is None and warning:
+            problem = Problem(Level.WARN, warning)
+        level, message = problem or Problem(Level.OK, values['state'])
+        return Diagnosis(name, level, message, values)
 
     def _rate(self) -> float:
         """Return images per second, over the arrivals that are remembered."""
         recent = [arrival for arrival in self._arrivals if arrival > self._clock() - 5]
         return (len(recent) - 1) / (recent[-1] - recent[0]) if len(recent) > 1 \
             and recent[-1] > recent[0] else 0.0
-
-
-def silence_warning(seconds: float, topic: str, publishers: int) -> str:
-    """Say that no image comes, and where to look."""
-    advice = 'nobody publishes there: check the topic name (remap image_raw)' \
-        if not publishers else \
-        f'{publishers} publish there: check the QoS reliability (parameter image_reliability) ' \
-        'and, for large images, the shared-memory profile of the camera'
-    return f'no image for {seconds:.0f} s on {topic}: check topic name and QoS reliability; ' \
-        f'{advice}'

@@ -22,20 +22,26 @@ import time
 
 from builtin_interfaces.msg import Time
 from geometry_msgs.msg import PolygonStamped
+from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.node import Node
 from rclpy.qos import HistoryPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.subscription import Subscription
 from sensor_msgs.msg import CompressedImage, Image, RegionOfInterest
 from std_msgs.msg import Header
 
+from lmsco_ros.core.errors import LMSCOError
 from lmsco_ros.core.types import BoundingBox
-from lmsco_ros.node.diagnostics import HealthMonitor
+from lmsco_ros.node.diagnostics import HealthMonitor, Problem
 from lmsco_ros.node.history import NANOSECONDS
+from lmsco_ros.node.image_sources import (image_sources, other_image_topics, stale_message,
+                                          unheard_warning)
+from lmsco_ros.node.outcome import Frame
 from lmsco_ros.node.parameters import Settings
-from lmsco_ros.node.worker import Frame, TrackerWorker
+from lmsco_ros.node.worker import TrackerWorker
 from msg_adapters.boxes import box_from_polygon, box_from_region
 from msg_adapters.errors import MessageError
 from msg_adapters.image import image_from_compressed, image_from_message
+from msg_adapters.status import Level
 
 _RELIABILITY = {
     'best_effort': ReliabilityPolicy.BEST_EFFORT,
@@ -54,7 +60,7 @@ class Inputs:
     node : Node
         Owner of the subscriptions.
     settings : Settings
-        Transport and quality of service of the images.
+        Transport, quality of service and edges of the images.
     worker : TrackerWorker
         Gets the frames and the boxes.
     monitor : HealthMonitor
@@ -70,7 +76,8 @@ class Inputs:
         self._worker = worker
         self._monitor = monitor
         self._refuse = refuse
-        self._images = self._subscribe_images(settings)
+        self._crop = settings.crop
+        self._image_type, self._images = self._subscribe_images(settings)
         self._boxes = [
             node.create_subscription(RegionOfInterest, 'init_box', self._on_region, _BOX_DEPTH),
             node.create_subscription(PolygonStamped, 'init_box_stamped', self._on_polygon,
@@ -82,21 +89,49 @@ class Inputs:
         """Full name of the topic that images are expected on."""
         return self._images.topic_name
 
+    def problem(self, timeout: float) -> Problem | None:
+        """Return why no image came for `timeout` seconds, or who cannot be heard."""
+        silence = self._monitor.silence()
+        sources = image_sources(self._node.get_publishers_info_by_topic(self.image_topic),
+                                self._image_type, self._images.qos_profile)
+        if silence > timeout:
+            elsewhere = other_image_topics(self._node, self.image_topic, self._image_type)
+            return Problem(Level.STALE, stale_message(
+                silence, self.image_topic, sources, elsewhere))
+        unheard = unheard_warning(sources, self.image_topic)
+        return Problem(Level.WARN, unheard) if unheard else None
+
     def close(self) -> None:
         """Stop listening."""
         for subscription in [self._images, *self._boxes]:
             self._node.destroy_subscription(subscription)
 
-    def _subscribe_images(self, settings: Settings) -> Subscription:
+    def _subscribe_images(self, settings: Settings) -> tuple[str, Subscription]:
+        """Return the name of the image type, and the subscription."""
         qos = QoSProfile(
             history=HistoryPolicy.KEEP_LAST if settings.image_depth else HistoryPolicy.KEEP_ALL,
             depth=settings.image_depth,
             reliability=_RELIABILITY[settings.image_reliability])
-        if settings.image_transport == 'raw':
-            return self._node.create_subscription(Image, 'image_raw', self._on_raw, qos)
-        # A remapping of image_raw has to reach the name that is made from it.
-        topic = self._node.resolve_topic_name('image_raw') + '/compressed'
-        return self._node.create_subscription(CompressedImage, topic, self._on_compressed, qos)
+        topic, kind, callback = 'image_raw', Image, self._on_raw
+        if settings.image_transport == 'compressed':
+            # A remapping of image_raw has to reach the name that is made from it.
+            topic = self._node.resolve_topic_name('image_raw') + '/compressed'
+            kind, callback = CompressedImage, self._on_compressed
+        subscription = self._node.create_subscription(
+            kind, topic, callback, qos, event_callbacks=SubscriptionEventCallbacks(
+                incompatible_qos=lambda event: self._on_unheard(),
+                incompatible_type=lambda event: self._on_unheard()))
+        return f'sensor_msgs/msg/{kind.__name__}', subscription
+
+    def _on_unheard(self) -> None:
+        """Tell at once when somebody offers images that cannot be received."""
+        sources = image_sources(self._node.get_publishers_info_by_topic(self.image_topic),
+                                self._image_type, self._images.qos_profile)
+        # The graph may know of the publisher later than the middleware does; the health
+        # report, which comes every second, names it then.
+        warning = unheard_warning(sources, self.image_topic)
+        if warning:
+            self._node.get_logger().warning(warning)
 
     def _on_raw(self, message: Image) -> None:
         self._take(message, image_from_message)
@@ -111,8 +146,8 @@ class Inputs:
                 'the stamps of the images went backwards; earlier images are forgotten, '
                 'tracking goes on', throttle_duration_sec=5.0)
         try:
-            image = decode(message)
-        except MessageError as error:
+            image = self._crop.cut(decode(message))
+        except (MessageError, LMSCOError) as error:
             self._refuse(message.header, str(error))
         else:
             self._worker.submit(Frame(image, stamp, received, message.header))
@@ -128,8 +163,8 @@ class Inputs:
     def _start(self, header: Header, message: RegionOfInterest | PolygonStamped,
                read: Callable, stamp: int | None) -> None:
         try:
-            box = BoundingBox(*read(message))
-        except MessageError as error:
+            box = self._crop.inwards(BoundingBox(*read(message)))
+        except (MessageError, LMSCOError) as error:
             self._refuse(header, str(error))
         else:
             self._worker.initialize(box, stamp)

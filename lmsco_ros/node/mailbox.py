@@ -38,11 +38,9 @@ class Mailbox(ABC, Generic[T]):
         self._changed = threading.Condition()
         self._closed = False
 
+    @abstractmethod
     def put(self, item: T) -> None:
         """Append an item that must not be dropped."""
-        with self._changed:
-            self._items.append(item)
-            self._changed.notify_all()
 
     @abstractmethod
     def put_frame(self, frame: T) -> int:
@@ -64,20 +62,30 @@ class Mailbox(ABC, Generic[T]):
     def supersede(self, stale: Callable[[T], bool]) -> None:
         """Drop waiting items, other than frames, that a new command makes pointless."""
 
+    @abstractmethod
+    def skips_behind(self, late: Callable[[T], bool]) -> bool:
+        """Tell whether a frame put now may be dropped while late items wait before it."""
+
     def close(self) -> None:
         """Wake everybody who waits; nothing is handed out from now on."""
         with self._changed:
             self._closed = True
             self._changed.notify_all()
 
-    def _append_frame(self, frame: T) -> None:
-        self._items.append(frame)
-        self._frames.append(frame)
+    def _append(self, item: T, *, is_frame: bool = False) -> None:
+        self._items.append(item)
+        if is_frame:
+            self._frames.append(item)
         self._changed.notify_all()
 
 
 class LatestMailbox(Mailbox[T]):
     """Keeps one frame: a new one takes the place of one that still waits."""
+
+    def put(self, item: T) -> None:
+        """Append an item."""
+        with self._changed:
+            self._append(item)
 
     def put_frame(self, frame: T) -> int:
         """Append a frame; return 1 when an older one had to go."""
@@ -85,7 +93,7 @@ class LatestMailbox(Mailbox[T]):
             dropped = len(self._frames)
             if dropped:
                 self._items.remove(self._frames.popleft())
-            self._append_frame(frame)
+            self._append(frame, is_frame=True)
             return dropped
 
     def supersede(self, stale: Callable[[T], bool]) -> None:
@@ -93,10 +101,15 @@ class LatestMailbox(Mailbox[T]):
         with self._changed:
             self._items = deque(item for item in self._items if not stale(item))
 
+    def skips_behind(self, late: Callable[[T], bool]) -> bool:
+        """Tell whether late items wait."""
+        with self._changed:
+            return any(map(late, self._items))
+
 
 class BoundedMailbox(Mailbox[T]):
     """
-    Keeps every frame, and makes the sender wait while `capacity` items are waiting.
+    Keeps everything, and makes the sender wait while `capacity` items are waiting.
 
     Parameters
     ----------
@@ -109,13 +122,24 @@ class BoundedMailbox(Mailbox[T]):
         super().__init__()
         self._capacity = capacity
 
+    def put(self, item: T) -> None:
+        """Append an item as soon as there is room."""
+        self._wait_and_append(item, is_frame=False)
+
     def put_frame(self, frame: T) -> int:
         """Append a frame as soon as there is room; none is ever dropped."""
-        with self._changed:
-            self._changed.wait_for(
-                lambda: len(self._items) < self._capacity or self._closed)
-            self._append_frame(frame)
-            return 0
+        self._wait_and_append(frame, is_frame=True)
+        return 0
 
     def supersede(self, stale: Callable[[T], bool]) -> None:
         """Keep them: what comes out must not depend on how fast it is taken."""
+
+    def skips_behind(self, late: Callable[[T], bool]) -> bool:
+        """Return False: no frame is ever dropped."""
+        return False
+
+    def _wait_and_append(self, item: T, *, is_frame: bool) -> None:
+        with self._changed:
+            self._changed.wait_for(
+                lambda: len(self._items) < self._capacity or self._closed)
+            self._append(item, is_frame=is_frame)

@@ -17,6 +17,7 @@
 
 from __future__ import annotations
 
+import time
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray
@@ -29,8 +30,9 @@ from visualization_msgs.msg import ImageMarker
 
 from lmsco_ros.core.types import TrackResult, TrackState
 from lmsco_ros.node.diagnostics import frame_status
+from lmsco_ros.node.outcome import Outcome
 from lmsco_ros.node.parameters import Settings
-from lmsco_ros.node.worker import Outcome
+from lmsco_ros.node.target_temperature import celsius, target_reading
 from lmsco_ros.visualization.display_range import DisplayRange
 from lmsco_ros.visualization.overlay import draw_overlay, state_color
 from msg_adapters.boxes import detections_available, detections_from_box, polygon_from_box
@@ -51,7 +53,7 @@ class Outputs:
     node : LifecycleNode
         Owner of the publishers.
     settings : Settings
-        How pictures are drawn; may be replaced while running.
+        How pictures are drawn and counts are told; may be replaced while running.
 
     """
 
@@ -67,13 +69,23 @@ class Outputs:
         self._marker = self._publisher(ImageMarker, 'marker')
         self._detections = self._detections_publisher()
 
-    def publish(self, outcome: Outcome, dropped_frames: int) -> None:
-        """Say everything about one frame, what others wait for first."""
-        header, result = outcome.frame.context, outcome.result
+    def publish(self, outcome: Outcome, dropped_frames: int) -> float:
+        """
+        Say everything about one frame, what others wait for first.
+
+        Returns
+        -------
+        float
+            When the box was published, on the clock of `time.monotonic`.
+
+        """
+        header, crop = outcome.frame.context, self.settings.crop
+        result = None if outcome.result is None else crop.outwards(outcome.result)
         found = result if result is not None and result.state is not TrackState.LOST else None
         if found is not None:
             self._box.publish(polygon_from_box(found.box.as_tuple(), header))
-        self.publish_status(frame_status(outcome, dropped_frames), header)
+        published = time.monotonic()
+        self.publish_status(self._frame_status(outcome, dropped_frames, published), header)
         if self._detections is not None and _is_heard(self._detections):
             self._detections.publish(_detections(found, outcome.track_id, header))
         if _is_heard(self._marker):
@@ -81,9 +93,10 @@ class Outputs:
         if result is not None and _is_heard(self._confidence):
             self._confidence.publish(message_from_confidence(
                 result.confidence_map, result.search_region.as_tuple(),
-                outcome.frame.image.shape[:2], header))
+                crop.full_shape(outcome.frame.image), header))
         if _is_heard(self._overlay):
-            self._publish_overlay(outcome, header)
+            self._publish_overlay(outcome, result, header)
+        return published
 
     def publish_status(self, status: FrameStatus, header: Header) -> None:
         """Say how things are with one frame."""
@@ -113,12 +126,23 @@ class Outputs:
         return marker_from_box(found.box.as_tuple(), (red, green, blue), namespace=namespace,
                                line_width=self.settings.marker_line_width, header=header)
 
-    def _publish_overlay(self, outcome: Outcome, header: Header) -> None:
+    def _frame_status(self, outcome: Outcome, dropped_frames: int,
+                      published: float) -> FrameStatus:
+        result, reading = outcome.result, None
+        if result is not None and result.state is not TrackState.LOST:
+            reading = target_reading(outcome.frame.image, result.box.as_tuple())
+        settings = self.settings
+        return frame_status(
+            outcome, dropped_frames, published, target=reading, target_celsius=celsius(
+                reading, settings.radiometric_scale, settings.radiometric_offset))
+
+    def _publish_overlay(self, outcome: Outcome, result: TrackResult | None,
+                         header: Header) -> None:
         self._frames += 1
         if self._frames % self.settings.overlay_interval:
             return
-        view = self._display_range.apply(outcome.frame.image)
-        picture = draw_overlay(view, outcome.result, label=self.settings.overlay_label)
+        view = self.settings.crop.fill(self._display_range.apply(outcome.frame.image))
+        picture = draw_overlay(view, result, label=self.settings.overlay_label)
         self._overlay.publish(message_from_image(picture, encoding='bgr8', header=header))
 
 

@@ -30,9 +30,11 @@ from rclpy.exceptions import InvalidParameterValueException
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
+from lmsco_ros.node.crop import Crop
+
 
 def _setting(default: Any, description: str, *, limits: tuple[float, float] | None = None,
-             choices: tuple[str, ...] = (), live: bool = False) -> Any:
+             choices: tuple[str, ...] = (), live: bool = False, fixed: bool = False) -> Any:
     """
     Return the field of one parameter.
 
@@ -48,10 +50,13 @@ def _setting(default: Any, description: str, *, limits: tuple[float, float] | No
         Allowed values of a string; empty allows any.
     live : bool
         Whether a change takes effect at once, rather than when the node is configured.
+    fixed : bool
+        Whether only the start of the node can set it, and nobody in the graph.
 
     """
     return field(default=default, metadata={
-        'description': description, 'limits': limits, 'choices': choices, 'live': live})
+        'description': description, 'limits': limits, 'choices': choices, 'live': live,
+        'fixed': fixed})
 
 
 @dataclass(frozen=True)
@@ -60,12 +65,13 @@ class Settings:
 
     autostart: bool = _setting(
         True, 'Configure and activate the node when it starts; otherwise do it by lifecycle '
-        'transitions.')
+        'transitions. Only at the start.', fixed=True)
     preset: str = _setting(
         'default', 'Named tracker configuration; an unknown name is answered with the known.')
     tracker_config: str = _setting(
         '', 'YAML file with a tracker configuration, in place of the preset; it may name a '
-        'preset itself and change single values. Empty: use the preset.')
+        'preset itself and change single values. Empty: use the preset. Only at the start, so '
+        'that no file is opened for a message.', fixed=True)
     device: str = _setting(
         '', 'Where the tracker computes: cpu, cuda or cuda:N. Empty: as the tracker '
         'configuration says.')
@@ -92,9 +98,27 @@ class Settings:
         2.0, 'How long images are kept for init_box_stamped, in seconds.', limits=(0.0, 60.0))
     frame_history_frames: int = _setting(
         64, 'At most this many images are kept for init_box_stamped.', limits=(1, 10000))
+    crop_left: int = _setting(
+        0, 'Columns at the left edge of the image that the tracker does not see; boxes stay in '
+        'pixels of the full image.', limits=(0, 10000))
+    crop_top: int = _setting(
+        0, 'Rows at the top edge that the tracker does not see, such as telemetry.',
+        limits=(0, 10000))
+    crop_right: int = _setting(
+        0, 'Columns at the right edge that the tracker does not see.', limits=(0, 10000))
+    crop_bottom: int = _setting(
+        0, 'Rows at the bottom edge that the tracker does not see, such as telemetry.',
+        limits=(0, 10000))
     no_image_timeout: float = _setting(
-        3.0, 'Seconds without an image after which the node warns.', limits=(0.1, 3600.0),
-        live=True)
+        3.0, 'Seconds without an image after which /diagnostics turns stale and names the '
+        'likely causes.', limits=(0.1, 3600.0), live=True)
+    radiometric_scale: float = _setting(
+        0.0, 'Degrees Celsius for one unit of the image, 0.01 for centikelvin; ~/status then '
+        'gives the temperature of the target. 0: the image is not radiometric.',
+        limits=(0.0, 1000.0), live=True)
+    radiometric_offset: float = _setting(
+        0.0, 'Degrees Celsius at the image value 0, -273.15 for kelvin and centikelvin.',
+        limits=(-10000.0, 10000.0), live=True)
     overlay_interval: int = _setting(
         1, 'Publish ~/overlay for every n-th image, to save bandwidth.', limits=(1, 1000),
         live=True)
@@ -102,6 +126,11 @@ class Settings:
         '', 'Text in the lower left corner of ~/overlay.', live=True)
     marker_line_width: float = _setting(
         2.0, 'Width of the outline in ~/marker, in pixels.', limits=(0.1, 100.0), live=True)
+
+    @property
+    def crop(self) -> Crop:
+        """The edges of the image that are cut off."""
+        return Crop(self.crop_left, self.crop_top, self.crop_right, self.crop_bottom)
 
 
 LIVE = frozenset(item.name for item in fields(Settings) if item.metadata['live'])
@@ -170,7 +199,7 @@ def _problem(parameter: Parameter) -> str:
 def _descriptor(item: Field) -> ParameterDescriptor:
     descriptor = ParameterDescriptor(
         description=item.metadata['description'],
-        read_only=item.name == 'autostart',
+        read_only=item.metadata['fixed'],
         additional_constraints=', '.join(item.metadata['choices']))
     if item.metadata['limits'] is not None:
         lowest, highest = item.metadata['limits']

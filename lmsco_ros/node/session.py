@@ -22,13 +22,15 @@ import traceback
 from rclpy.lifecycle import LifecycleNode
 from std_msgs.msg import Header
 
-from lmsco_ros.node.diagnostics import HealthMonitor, refused_status
+from lmsco_ros.node.diagnostics import HealthMonitor, Problem, refused_status
 from lmsco_ros.node.history import FrameHistory
 from lmsco_ros.node.inputs import Inputs
 from lmsco_ros.node.mailbox import BoundedMailbox, LatestMailbox, Mailbox
+from lmsco_ros.node.outcome import Outcome, Phase, Tracker
 from lmsco_ros.node.outputs import Outputs
 from lmsco_ros.node.parameters import Settings
-from lmsco_ros.node.worker import Outcome, Phase, Tracker, TrackerWorker
+from lmsco_ros.node.worker import TrackerWorker
+from msg_adapters.status import Level
 
 # A signal has to end the process within a second, whatever the tracker is at.
 _STOP_SECONDS = 0.6
@@ -72,6 +74,14 @@ class TrackingSession:
         """Full name of the topic that images are expected on."""
         return self._inputs.image_topic
 
+    def problem(self, timeout: float) -> Problem | None:
+        """Return what keeps images from coming in, or answers from going out."""
+        busy = self.worker.busy_seconds
+        if busy > timeout:
+            return Problem(Level.ERROR, f'the tracker has been at one frame for {busy:.0f} s; '
+                           'deactivate the node and configure it again')
+        return self._inputs.problem(timeout)
+
     def stop(self) -> bool:
         """Stop listening and tracking; return whether the tracker came back in time."""
         self._inputs.close()
@@ -82,7 +92,8 @@ class TrackingSession:
         log = self._node.get_logger()
         try:
             self._monitor.answered(outcome)
-            self._outputs.publish(outcome, self.worker.dropped_frames)
+            published = self._outputs.publish(outcome, self.worker.dropped_frames)
+            self._monitor.published(outcome, published)
             if outcome.phase is Phase.FAILED:
                 log.error(f'the tracker failed, the target is dropped: {outcome.error}')
             elif outcome.phase is Phase.REFUSED:

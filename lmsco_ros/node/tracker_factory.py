@@ -16,9 +16,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 
 from lmsco_ros.core import LMSCOTracker, TrackerConfig
+from lmsco_ros.node.gpu_fallback import FallbackTracker
+from lmsco_ros.node.outcome import Tracker
 from lmsco_ros.node.parameters import Settings
 
 
@@ -45,3 +48,22 @@ def tracker_config(settings: Settings) -> TrackerConfig:
 def make_tracker(settings: Settings) -> LMSCOTracker:
     """Return a tracker as the parameters describe it; raises as :func:`tracker_config`."""
     return LMSCOTracker(tracker_config(settings))
+
+
+def with_fallback(factory: Callable[[Settings], Tracker], settings: Settings,
+                  warn: Callable[[str], None]) -> FallbackTracker:
+    """
+    Return the tracker of a factory that may retreat from the GPU to the processor.
+
+    Parameters
+    ----------
+    factory : callable
+        Makes a tracker from the parameters.
+    settings : Settings
+        The parameters.
+    warn : callable
+        Called with the reason of a retreat.
+
+    """
+    return FallbackTracker(lambda device: factory(replace(settings, device=device)),
+                           settings.device, warn)

@@ -40,13 +40,13 @@ from std_srvs.srv import SetBool, Trigger
 
 from lmsco_ros.core.errors import LMSCOError
 from lmsco_ros.node import parameters
-from lmsco_ros.node.diagnostics import HealthMonitor, silence_warning
+from lmsco_ros.node.diagnostics import HealthMonitor, Problem
+from lmsco_ros.node.outcome import Tracker
 from lmsco_ros.node.outputs import Outputs
 from lmsco_ros.node.parameters import Settings
 from lmsco_ros.node.session import TrackingSession
-from lmsco_ros.node.tracker_factory import make_tracker
-from lmsco_ros.node.worker import Tracker
-from msg_adapters.status import message_from_diagnoses
+from lmsco_ros.node.tracker_factory import make_tracker, with_fallback
+from msg_adapters.status import Level, message_from_diagnoses
 
 _HEALTH_PERIOD = 1.0
 # A signal is noticed after this time at the latest.
@@ -128,7 +128,8 @@ class TrackerNode(LifecycleNode):
     def on_configure(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Read the parameters, make the tracker, offer topics and services."""
         self.settings = parameters.read(self)
-        self._tracker = self._tracker_factory(self.settings)
+        self._monitor.warned('')
+        self._tracker = with_fallback(self._tracker_factory, self.settings, self._warn)
         self._outputs = Outputs(self, self.settings)
         self._served = [
             self.create_service(Trigger, '~/reset', self._on_reset),
@@ -207,24 +208,22 @@ class TrackerNode(LifecycleNode):
             response.message = 'enabled' if request.data else 'disabled'
         return response
 
+    def _warn(self, warning: str) -> None:
+        """Log what stays wrong, and keep it in the diagnostics."""
+        self.get_logger().warning(warning)
+        self._monitor.warned(warning)
+
     def _report_health(self) -> None:
-        warning, dropped = 'the node is not active', 0
+        problem, dropped = Problem(Level.WARN, 'the node is not active'), 0
         if self._session is not None:
-            warning, dropped = self._silence(self._session), self._session.worker.dropped_frames
-        diagnosis = self._monitor.report(self.get_name(), warning=warning,
+            problem = self._session.problem(self.settings.no_image_timeout)
+            dropped = self._session.worker.dropped_frames
+            if problem is not None:
+                self.get_logger().warning(problem.message, throttle_duration_sec=10.0)
+        diagnosis = self._monitor.report(self.get_name(), problem=problem,
                                          dropped_frames=dropped)
         header = Header(stamp=self.get_clock().now().to_msg())
         self._health.publish(message_from_diagnoses([diagnosis], header))
-
-    def _silence(self, session: TrackingSession) -> str:
-        """Return a warning, and log it, when images have not come for too long."""
-        silence = self._monitor.silence()
-        if silence <= self.settings.no_image_timeout:
-            return ''
-        topic = session.image_topic
-        warning = silence_warning(silence, topic, self.count_publishers(topic))
-        self.get_logger().warning(warning, throttle_duration_sec=10.0)
-        return warning
 
     def _judge_change(self, changes: list[Parameter]) -> SetParametersResult:
         return parameters.judge_change(changes, configured=self._tracker is not None)

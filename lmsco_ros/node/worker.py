@@ -16,105 +16,21 @@
 A tracker in a thread of its own, fed through a mailbox; knows nothing of ROS.
 
 Frames and commands take effect in the order in which they were given. Everything that
-happens to a frame comes back as an :class:`Outcome`, errors included.
+happens to a frame comes back as an :class:`~lmsco_ros.node.outcome.Outcome`, errors included.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from enum import Enum
 import threading
 import time
-from typing import Any, Protocol
-
-import numpy.typing as npt
 
 from lmsco_ros.core.errors import LMSCOError
 from lmsco_ros.core.types import BoundingBox, TrackResult
 from lmsco_ros.node.history import FrameHistory, NANOSECONDS
 from lmsco_ros.node.mailbox import Mailbox
-
-
-class Tracker(Protocol):
-    """The part of the tracker that the worker uses."""
-
-    def initialize(self, image: npt.NDArray, box: BoundingBox) -> TrackResult:
-        """Start on a target."""
-
-    def update(self, image: npt.NDArray) -> TrackResult:
-        """Find the target in the next frame."""
-
-
-@dataclass(frozen=True, eq=False)
-class Frame:
-    """
-    One image on its way to the tracker.
-
-    Attributes
-    ----------
-    image : ndarray, shape (H, W) or (H, W, 3)
-        Not changed by anybody from here on.
-    stamp : int
-        When it was taken, in nanoseconds.
-    received : float
-        When it arrived, on the clock of `time.monotonic`.
-    context : Any
-        Whatever the sender wants to get back with the outcome.
-
-    """
-
-    image: npt.NDArray
-    stamp: int
-    received: float
-    context: Any = None
-
-
-class Phase(Enum):
-    """What became of a frame."""
-
-    TRACKED = 'tracked'
-    IDLE = 'idle'
-    DISABLED = 'disabled'
-    REFUSED = 'refused'
-    FAILED = 'failed'
-
-
-@dataclass(frozen=True, eq=False)
-class Outcome:
-    """
-    What the tracker has to say about one frame.
-
-    Attributes
-    ----------
-    frame : Frame
-    phase : Phase
-        TRACKED (there is a result), IDLE (no target), DISABLED, REFUSED (a request or a
-        frame could not be used; nothing changed) or FAILED (the tracker raised; the target is
-        dropped).
-    result : TrackResult or None
-        Only when TRACKED.
-    track_id : int
-        Number of the start that the result belongs to; 0 before the first.
-    live : bool
-        False for frames that are gone through again after a start in the past.
-    error : str
-        Why the request was refused or the target dropped.
-    tracker_seconds : float
-        Time spent in the tracker.
-    latency_seconds : float
-        From the frame's arrival until now.
-
-    """
-
-    frame: Frame
-    phase: Phase
-    result: TrackResult | None
-    track_id: int
-    live: bool
-    error: str
-    tracker_seconds: float
-    latency_seconds: float
+from lmsco_ros.node.outcome import Frame, Outcome, Phase, Tracker
 
 
 @dataclass(frozen=True, eq=False)
@@ -173,7 +89,7 @@ class TrackerWorker:
     tracker : Tracker
         Used by the worker's thread only.
     deliver : callable
-        Called with every :class:`Outcome`, in the worker's thread; must not raise.
+        Called with every outcome, in the worker's thread; must not raise.
     mailbox : Mailbox
         Decides what happens when frames come faster than they are tracked: a
         :class:`~lmsco_ros.node.mailbox.LatestMailbox` drops the older ones, a
@@ -192,7 +108,9 @@ class TrackerWorker:
         self._intake = threading.Lock()
         self._request: _Request | None = None
         self._dropped = 0
+        self._extra_steps = 0
         # The rest belongs to the thread alone.
+        self._busy_since: float | None = None
         self._track_id = 0
         self._has_target = False
         self._enabled = True
@@ -209,6 +127,12 @@ class TrackerWorker:
     def track_id(self) -> int:
         """Number of the latest start; 0 before the first."""
         return self._track_id
+
+    @property
+    def busy_seconds(self) -> float:
+        """Time since the tracker began with the frame that it is at; 0 while it waits."""
+        since = self._busy_since
+        return 0.0 if since is None else time.monotonic() - since
 
     def start(self) -> None:
         """Start the thread."""
@@ -250,7 +174,11 @@ class TrackerWorker:
             if request is not None and request.has_missed(frame, self._history.seconds):
                 self._request = None
                 self._mailbox.put(_Refuse(frame, _unknown_stamp(request.stamp, self._history)))
-            self._dropped += self._mailbox.put_frame(_Step(frame))
+            if self._extra_steps and self._mailbox.skips_behind(_is_late_step):
+                self._extra_steps -= 1
+                self._mailbox.put(_Step(frame, live=False))
+            else:
+                self._dropped += self._mailbox.put_frame(_Step(frame))
 
     def initialize(self, box: BoundingBox, stamp: int | None = None) -> None:
         """
@@ -262,9 +190,10 @@ class TrackerWorker:
             The target.
         stamp : int, optional
             Stamp of the frame that the box was seen in, in nanoseconds. Frames that came
-            since are gone through again. By default the newest frame is taken. A start
-            whose frame is still to come waits for it: without a stamp for the first frame,
-            with one no longer than frames are kept.
+            since are gone through again, and those that come meanwhile, up to twice as many
+            as the history holds; then the newest is next. By default the newest frame is
+            taken. A start whose frame is still to come waits for it: without a stamp for the
+            first frame, with one no longer than frames are kept.
 
         """
         with self._intake:
@@ -278,6 +207,7 @@ class TrackerWorker:
                 self._mailbox.put(_Refuse(newest, _unknown_stamp(stamp, self._history)))
                 return
             self._mailbox.put(_Start(frames[0], box))
+            self._extra_steps = self._history.maxlen
             for frame in frames[1:]:
                 self._mailbox.put(_Step(frame, live=False))
 
@@ -295,14 +225,15 @@ class TrackerWorker:
     def _supersede(self) -> None:
         """Forget what an earlier start still waits for."""
         self._request = None
-        self._mailbox.supersede(
-            lambda item: isinstance(item, (_Step, _Start)) and not item.live)
+        self._mailbox.supersede(_is_superseded)
 
     def _run(self) -> None:
         handlers = {_Step: self._step, _Start: self._begin, _Refuse: self._refuse,
                     _Reset: self._drop_target, _Enable: self._enable}
         while (item := self._mailbox.take()) is not None:
+            self._busy_since = time.monotonic()
             handlers[type(item)](item)
+            self._busy_since = None
 
     def _step(self, item: _Step) -> None:
         if not self._enabled:
@@ -342,24 +273,34 @@ class TrackerWorker:
         What the tracker refuses leaves it as it was; anything else that it raises costs the
         target, and only that.
         """
-        began = time.monotonic()
+        started = time.monotonic()
         try:
             result = work()
         except LMSCOError as error:
-            self._report(item, Phase.REFUSED, str(error), seconds=time.monotonic() - began)
+            self._report(item, Phase.REFUSED, str(error), started=started)
         except Exception as error:  # noqa: B902
             self._has_target = False
-            self._report(item, Phase.FAILED, f'{type(error).__name__}: {error}',
-                         seconds=time.monotonic() - began)
+            self._report(item, Phase.FAILED, f'{type(error).__name__}: {error}', started=started)
         else:
-            self._report(item, Phase.TRACKED, result=result, seconds=time.monotonic() - began)
+            self._report(item, Phase.TRACKED, result=result, started=started)
 
     def _report(self, item: _Step | _Start | _Refuse, phase: Phase, error: str = '', *,
-                result: TrackResult | None = None, seconds: float = 0.0) -> None:
+                result: TrackResult | None = None, started: float | None = None) -> None:
         if not self._stopping.is_set():
             live = isinstance(item, (_Step, _Start)) and item.live
+            finished = time.monotonic()
             self._deliver(Outcome(item.frame, phase, result, self._track_id, live, error,
-                                  seconds, time.monotonic() - item.frame.received))
+                                  finished if started is None else started, finished))
+
+
+def _is_late_step(item: object) -> bool:
+    """Tell whether an item belongs to a start in the past that catches up."""
+    return isinstance(item, _Step) and not item.live
+
+
+def _is_superseded(item: object) -> bool:
+    """Tell whether a new request leaves no use for an item."""
+    return isinstance(item, _Refuse) or isinstance(item, (_Step, _Start)) and not item.live
 
 
 def _unknown_stamp(stamp: int, history: FrameHistory[Frame]) -> str:

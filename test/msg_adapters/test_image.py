@@ -25,6 +25,7 @@ import pytest
 from sensor_msgs.msg import CompressedImage, Image
 from std_msgs.msg import Header
 
+from msg_adapters.compressed_size import declared_size
 from msg_adapters.errors import ImageMessageError
 from msg_adapters.image import (compressed_from_image, ENCODINGS, image_from_compressed,
                                 image_from_message, message_from_image)
@@ -206,3 +207,57 @@ def test_other_files_and_pixels_are_refused():
     _, transparent = cv2.imencode('.png', np.zeros((2, 2, 4), np.uint8))
     with pytest.raises(ImageMessageError, match=r'\(2, 2, 4\)'):
         image_from_compressed(CompressedImage(data=transparent.tobytes()))
+
+
+@pytest.mark.parametrize('declared', [
+    '', 'jpeg', '16UC1; png compressed', 'mono8; jpeg compressed bgr8', 'tiff', '\u2603',
+    'x' * 5000])
+@pytest.mark.parametrize('dtype', [np.uint8, np.uint16])
+def test_what_the_format_says_does_not_matter(declared, dtype):
+    image = np.random.default_rng(1).integers(0, np.iinfo(dtype).max, (5, 7), dtype)
+    message = compressed_from_image(image)
+    message.format = declared
+    back = image_from_compressed(message)
+    assert back.dtype == dtype
+    np.testing.assert_array_equal(back, image)
+
+
+@pytest.mark.parametrize('codec', ['png', 'jpeg'])
+@given(damage=st.lists(st.tuples(st.integers(0, 10 ** 6), st.integers(0, 255)), min_size=1))
+def test_damaged_files_are_read_or_refused(codec, damage):
+    image = np.random.default_rng(0).integers(0, 255, (16, 16), np.uint8)
+    message = compressed_from_image(image, codec=codec)
+    for place, value in damage:
+        message.data[place % len(message.data)] = value
+    try:
+        assert image_from_compressed(message).dtype in (np.uint8, np.uint16)
+    except ImageMessageError as error:
+        assert 'expected' in str(error) or 'publish' in str(error) or 'send' in str(error)
+
+
+def test_small_file_that_claims_a_huge_image_is_refused_before_it_is_decoded(monkeypatch):
+    monkeypatch.setattr(cv2, 'imdecode', lambda *args: pytest.fail('decoded'))
+    for codec, place in (('png', 16), ('jpeg', None)):
+        message = compressed_from_image(np.zeros((8, 8), np.uint8), codec=codec)
+        data = bytearray(message.data)
+        if codec == 'png':
+            data[place:place + 8] = (40000).to_bytes(4, 'big') * 2
+        else:
+            place = data.index(b'\xff\xc0')
+            data[place + 5:place + 9] = (40000).to_bytes(2, 'big') * 2
+        message.data = array('B', data)
+        with pytest.raises(ImageMessageError, match='claims 40000 x 40000'):
+            image_from_compressed(message)
+
+
+@given(st.integers(1, 300), st.integers(1, 300), st.sampled_from(['png', 'jpeg']))
+def test_declared_size_is_that_of_the_image(width, height, codec):
+    data = compressed_from_image(np.zeros((height, width), np.uint8), codec=codec).data
+    assert declared_size(memoryview(data)) == (width, height)
+    assert declared_size(memoryview(data)[:11]) is None
+
+
+@given(st.binary(max_size=60),
+       st.sampled_from([b'\x89PNG', b'\xff\xd8', b'\xff\xd8\xff\xe0', b'']))
+def test_declared_size_of_anything_is_found_without_an_error(data, start):
+    declared_size(memoryview(start + data))

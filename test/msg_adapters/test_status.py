@@ -20,14 +20,15 @@ import pytest
 from std_msgs.msg import Header
 
 from msg_adapters.errors import StatusMessageError
-from msg_adapters.status import (diagnoses_from_message, Diagnosis, FrameStatus, Level,
-                                 message_from_diagnoses, message_from_status,
+from msg_adapters.status import (diagnoses_from_message, Diagnosis, FrameStatus, FrameTimes,
+                                 Level, message_from_diagnoses, message_from_status, Reading,
                                  status_from_message)
 
 FINITE = st.floats(allow_nan=False, allow_infinity=False)
 STATUSES = st.builds(
     FrameStatus, st.text(), st.integers(0), st.none() | FINITE, FINITE, FINITE, st.integers(0),
-    st.sampled_from(Level), st.text())
+    st.sampled_from(Level), st.text(), st.none() | st.builds(FrameTimes, *[FINITE] * 4),
+    st.none() | st.builds(Reading, *[FINITE] * 3), st.none() | st.builds(Reading, *[FINITE] * 3))
 DIAGNOSES = st.builds(Diagnosis, st.text(), st.sampled_from(Level), st.text(),
                       st.dictionaries(st.text(), st.text()), st.text())
 
@@ -43,7 +44,9 @@ def test_diagnoses_round_trip(diagnoses):
 
 
 def test_message_is_readable_by_people():
-    status = FrameStatus('lost', 3, 0.25, 12.5, 8.0, 4, Level.WARN, 'target lost')
+    status = FrameStatus('lost', 3, 0.25, 12.5, 8.0, 4, Level.WARN, 'target lost',
+                         FrameTimes(10.0, 10.25, 10.5, 11.0), Reading(30000.0, 30500.5, 31000.0),
+                         Reading(26.85, 31.855, 36.85))
     message = message_from_status(status, 'lmsco_tracker', Header(frame_id='thermal'))
     entry, = message.status
     assert message.header.frame_id == 'thermal'
@@ -51,7 +54,10 @@ def test_message_is_readable_by_people():
     assert entry.level == DiagnosticStatus.WARN
     assert {pair.key: pair.value for pair in entry.values} == {
         'state': 'lost', 'track_id': '3', 'score': '0.25', 'latency_ms': '12.5',
-        'tracker_ms': '8.0', 'dropped_frames': '4'}
+        'tracker_ms': '8.0', 'dropped_frames': '4', 'received': '10.0', 'started': '10.25',
+        'finished': '10.5', 'published': '11.0', 'target_minimum': '30000.0',
+        'target_mean': '30500.5', 'target_maximum': '31000.0', 'target_celsius_minimum': '26.85',
+        'target_celsius_mean': '31.855', 'target_celsius_maximum': '36.85'}
 
 
 @pytest.mark.parametrize('message', [

@@ -45,29 +45,32 @@ class FakeTracker:
     """
     Moves its box one pixel to the right in every frame.
 
-    `states` overrides the state of coming updates, `error` is raised once, `gate` holds every
-    call until it is set, `calls` tells what happened on which image.
+    `states` overrides the state of coming updates, `error` is raised once, `inspect` may raise
+    whatever it thinks of an image, `gate` holds every call until it is set, `calls` tells what
+    happened on which image.
     """
 
     def __init__(self):
         self.states, self.error, self.calls = [], None, []
+        self.inspect = lambda image: None
         self.gate = threading.Event()
         self.gate.set()
 
     def initialize(self, image, box):
         self.calls.append(('initialize', image.copy()))
+        self._obey(image)
         self.box = box
-        self._obey()
         return self._result(image, TrackState.TRACKING)
 
     def update(self, image):
         self.calls.append(('update', image.copy()))
-        self._obey()
+        self._obey(image)
         self.box = BoundingBox(self.box.x + 1, *self.box.as_tuple()[1:])
         return self._result(image, self.states.pop(0) if self.states else TrackState.TRACKING)
 
-    def _obey(self):
+    def _obey(self, image):
         assert self.gate.wait(PATIENCE)
+        self.inspect(image)
         error, self.error = self.error, None
         if error is not None:
             raise error
@@ -80,11 +83,12 @@ class FakeTracker:
 class Graph:
     """One context with one executor and a node that plays camera and user."""
 
-    def __init__(self):
+    def __init__(self, namespace='/'):
         self.context = Context()
         self.context.init()
         self.executor = SingleThreadedExecutor(context=self.context)
-        self.user = Node('user', context=self.context)
+        self.namespace = namespace
+        self.user = Node('user', context=self.context, namespace=namespace)
         self.executor.add_node(self.user)
         self.fake = FakeTracker()
         self.received = {}
@@ -95,7 +99,8 @@ class Graph:
         """Start the node under test with the fake tracker unless another is given."""
         factory = values.pop('tracker_factory', lambda settings: self.fake)
         node = TrackerNode(
-            context=self.context, tracker_factory=factory, cli_args=values.pop('cli_args', None),
+            context=self.context, namespace=self.namespace, tracker_factory=factory,
+            cli_args=values.pop('cli_args', None),
             parameter_overrides=[Parameter(name, value=value) for name, value in values.items()])
         self.executor.add_node(node)
         self.trackers.append(node)
@@ -160,6 +165,26 @@ def graph():
     graph.close()
 
 
+@pytest.fixture
+def own_graph(request):
+    """
+    Return a graph with names that no other test uses.
+
+    The middleware believes in the subscriptions of a killed process for a while.
+    """
+    graph = Graph(f'/{request.node.name}')
+    yield graph
+    graph.close()
+
+
+@pytest.fixture
+def other_graph():
+    """Return a second graph, of somebody else."""
+    graph = Graph()
+    yield graph
+    graph.close()
+
+
 class Running:
     """A running tracker node with its most used topics connected."""
 
@@ -185,8 +210,10 @@ class Running:
     def send(self, *images):
         """Publish images one by one, and wait for the answer to each."""
         for image in images or [self.graph.image()]:
+            before = len(self._status_messages)
             self.images.publish(image)
-            self.graph.spin_until(lambda: self._is_answered(image.header))
+            self.graph.spin_until(lambda: len(self._status_messages) > before
+                                  and self._is_answered(image.header))
         return self.statuses[-1]
 
     def _is_answered(self, header):
@@ -217,6 +244,12 @@ class Running:
     def last_box(self):
         """The newest box as x, y, width, height."""
         return box_from_polygon(self.boxes[-1])
+
+
+@pytest.fixture
+def make_fake():
+    """Return the maker of trackers that do as they are told."""
+    return FakeTracker
 
 
 @pytest.fixture

@@ -19,10 +19,9 @@ import numpy as np
 import pytest
 
 from lmsco_ros.core.types import BoundingBox, TrackResult, TrackState
-from lmsco_ros.node.diagnostics import (frame_status, HealthMonitor, refused_status,
-                                        silence_warning)
-from lmsco_ros.node.worker import Frame, Outcome, Phase
-from msg_adapters.status import Level
+from lmsco_ros.node.diagnostics import frame_status, HealthMonitor, Problem, refused_status
+from lmsco_ros.node.outcome import Frame, Outcome, Phase
+from msg_adapters.status import Level, Reading
 
 BOX = BoundingBox(1, 2, 3, 4)
 
@@ -36,16 +35,15 @@ class Clock:
         return self.now
 
 
-def outcome(phase=Phase.TRACKED, state=TrackState.TRACKING, *, latency=0.01, live=True,
-            error=''):
+def outcome(phase=Phase.TRACKED, state=TrackState.TRACKING, *, live=True, error=''):
     result = TrackResult(BOX, 0.5, state, np.zeros((2, 2), np.float32), BOX) \
         if phase is Phase.TRACKED else None
     frame = Frame(np.zeros((2, 2)), 0, 0.0)
-    return Outcome(frame, phase, result, 3, live, error, 0.004, latency)
+    return Outcome(frame, phase, result, 3, live, error, 0.006, 0.010)
 
 
 def report(monitor, **values):
-    return monitor.report('node', **{'warning': '', 'dropped_frames': 0, **values})
+    return monitor.report('node', **{'problem': None, 'dropped_frames': 0, **values})
 
 
 def test_rate_and_silence_follow_the_clock():
@@ -64,12 +62,11 @@ def test_rate_and_silence_follow_the_clock():
 
 def test_latency_counts_live_frames_only():
     monitor = HealthMonitor()
-    for latency in (0.010, 0.020, 0.030):
-        monitor.answered(outcome(latency=latency))
-    monitor.answered(outcome(latency=9.0, live=False))
+    for milliseconds in range(101):
+        monitor.published(outcome(), milliseconds / 1e3)
+    monitor.published(outcome(live=False), 9.0)
     values = report(monitor).values
-    assert (values['latency_p50_ms'], values['tracked']) == ('20.00', '4')
-    assert float(values['latency_p95_ms']) == pytest.approx(29)
+    assert [values[f'latency_p{p}_ms'] for p in (50, 95, 99)] == ['50.00', '95.00', '99.00']
 
 
 def test_backward_stamps_are_noticed():
@@ -84,13 +81,18 @@ def test_level_and_message_tell_what_is_wrong():
     assert report(monitor).level == Level.OK
     monitor.answered(outcome(state=TrackState.LOST))
     assert (report(monitor).level, report(monitor).message) == (Level.OK, 'lost')
-    assert report(monitor, warning='no image').level == Level.WARN
+    stale = report(monitor, problem=Problem(Level.STALE, 'no image'))
+    assert (stale.level, stale.message) == (Level.STALE, 'no image')
     monitor.refused('what encoding is this')
     assert report(monitor).level == Level.ERROR
     assert report(monitor).message == 'what encoding is this'
     monitor.answered(outcome())
     assert report(monitor).level == Level.OK
     assert report(monitor).values['last_error'] == 'what encoding is this'
+    monitor.warned('no memory')
+    assert (report(monitor).level, report(monitor).message) == (Level.WARN, 'no memory')
+    monitor.warned('')
+    assert report(monitor).level == Level.OK
 
 
 @pytest.mark.parametrize('given, state, level', [
@@ -103,10 +105,12 @@ def test_level_and_message_tell_what_is_wrong():
     (outcome(Phase.FAILED, error='why'), 'failed', Level.ERROR),
 ])
 def test_frame_status_tells_state_and_figures(given, state, level):
-    status = frame_status(given, 7)
+    status = frame_status(given, 7, 0.012, target=Reading(1, 2, 3))
     assert (status.state, status.level, status.track_id, status.dropped_frames) == (
         state, level, 3, 7)
-    assert (status.latency_ms, status.tracker_ms) == (10, 4)
+    assert (status.latency_ms, status.tracker_ms) == (12, pytest.approx(4))
+    assert np.diff(status.times) == pytest.approx([0.006, 0.004, 0.002], abs=1e-5)
+    assert (status.target, status.target_celsius) == (Reading(1, 2, 3), None)
     assert status.score == (0.5 if given.result else None)
     assert status.message and (not given.error or status.message == 'why')
 
@@ -114,10 +118,3 @@ def test_frame_status_tells_state_and_figures(given, state, level):
 def test_refused_status_carries_the_reason():
     status = refused_status('why', 2, 1)
     assert (status.state, status.message, status.track_id) == ('refused', 'why', 2)
-
-
-@pytest.mark.parametrize('publishers, advice', [(0, 'remap image_raw'), (2, 'image_reliability')])
-def test_silence_is_explained(publishers, advice):
-    warning = silence_warning(4.2, '/image_raw', publishers)
-    assert warning.startswith('no image for 4 s on /image_raw: check topic name and QoS')
-    assert advice in warning

@@ -98,8 +98,10 @@ def test_wrong_live_values_are_refused(graph):
     assert not result.successful
     result, = node.set_parameters([Parameter('frame_policy', value='some')])
     assert not result.successful and 'latest, all' in result.reason
-    result, = node.set_parameters([Parameter('autostart', value=True)])
-    assert not result.successful
+    for parameter in (Parameter('autostart', value=True),
+                      Parameter('tracker_config', value='/etc/passwd')):
+        result, = node.set_parameters([parameter])
+        assert not result.successful and 'read-only' in result.reason
 
 
 @pytest.mark.parametrize('name, policy', [

@@ -70,3 +70,26 @@ def test_frame_of_another_size_is_refused_and_costs_nothing(run):
     status = running.send(small)
     assert status.state == 'refused' and '(60, 80)' in status.message
     assert running.send(_image(running.graph, 1)).state == 'tracking'
+
+
+@pytest.mark.parametrize('value, states', [
+    (np.nan, ['refused']), (np.inf, ['refused']), (-np.inf, ['refused']),
+    # As a camera's shutter makes it.
+    (0.0, ['lost', 'uncertain'])])
+def test_frame_of_nonsense_temperatures_costs_nothing(run, value, states):
+    running = run(tracker_factory=make_tracker)
+
+    def image(number, replacement=None):
+        message = running.graph.image(shape=SHAPE, dtype=np.float32)
+        pixels = np.frombuffer(message.data, np.float32).reshape(SHAPE)
+        pixels[:] = _scene(number) if replacement is None else replacement
+        return message
+    running.start(30, 30, 20, 20)
+    for number in range(5):
+        assert running.send(image(number)).state == 'tracking'
+    boxes = len(running.boxes)
+    status = running.send(image(5, value))
+    assert status.state in states
+    assert len(running.boxes) == boxes + (status.state == 'uncertain')
+    status = running.send(image(5))
+    assert (status.state, status.track_id) == ('tracking', 1)

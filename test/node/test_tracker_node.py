@@ -373,16 +373,6 @@ def test_compressed_images(run):
     assert 'truncated' in running.send(image).message
 
 
-def test_health_names_topic_and_publishers_when_no_image_comes(graph):
-    graph.start_tracker(no_image_timeout=0.1)
-    health = graph.listen(DiagnosticArray, '/diagnostics')
-    graph.spin_until(lambda: len(health) > 1)
-    diagnosis, = diagnoses_from_message(health[-1])
-    assert diagnosis.level == Level.WARN
-    assert 'no image for' in diagnosis.message and '/image_raw' in diagnosis.message
-    assert 'check topic name and QoS reliability' in diagnosis.message
-
-
 def test_health_counts(running):
     health = running.graph.listen(DiagnosticArray, '/diagnostics')
     running.start()

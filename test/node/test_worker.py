@@ -28,7 +28,8 @@ import pytest
 from lmsco_ros.core.types import BoundingBox, TrackResult, TrackState
 from lmsco_ros.node.history import FrameHistory
 from lmsco_ros.node.mailbox import BoundedMailbox, LatestMailbox
-from lmsco_ros.node.worker import Frame, Phase, TrackerWorker
+from lmsco_ros.node.outcome import Frame, Phase
+from lmsco_ros.node.worker import TrackerWorker
 
 REPOSITORY = Path(__file__).resolve().parents[2]
 PATIENCE = 20.0
@@ -64,12 +65,12 @@ class Recorder:
 class Bench:
     """A worker, its tracker and what it delivered."""
 
-    def __init__(self, mailbox=None, seconds=10.0):
+    def __init__(self, mailbox=None, seconds=10.0, frames=100):
         self.tracker, self.outcomes = Recorder(), []
         self.changed = threading.Condition()
         self.worker = TrackerWorker(
             self.tracker, self._deliver, mailbox=mailbox or LatestMailbox(),
-            history=FrameHistory(seconds, 100))
+            history=FrameHistory(seconds, frames))
         self.worker.start()
 
     def _deliver(self, outcome):
@@ -88,6 +89,12 @@ class Bench:
         with self.changed:
             assert self.changed.wait_for(lambda: len(self.outcomes) >= count, PATIENCE)
             return self.outcomes[-1]
+
+    def wait_for(self, matches):
+        """Wait for an outcome that matches and return it."""
+        with self.changed:
+            assert self.changed.wait_for(lambda: any(map(matches, self.outcomes)), PATIENCE)
+            return next(filter(matches, self.outcomes))
 
     def hold(self):
         """Let the tracker get stuck in the next frame."""
@@ -126,7 +133,8 @@ def test_outcome_tells_frame_times_and_context(bench):
     outcome = b.wait(1)
     assert (outcome.phase, outcome.live, outcome.track_id) == (Phase.TRACKED, True, 1)
     assert outcome.frame.context == 'context'
-    assert outcome.latency_seconds >= 5 > outcome.tracker_seconds >= 0
+    assert outcome.started - outcome.frame.received >= 5
+    assert outcome.started <= outcome.finished <= time.monotonic()
 
 
 def test_latest_drops_what_a_busy_tracker_cannot_take(bench):
@@ -286,6 +294,95 @@ def test_request_for_a_frame_that_never_comes_expires(bench):
     b.frame(2, received=time.monotonic() + 3.5)
     b.wait(3)
     assert Phase.REFUSED in [o.phase for o in b.outcomes]
+
+
+def test_refusal_names_the_range_of_frames_that_are_kept(bench):
+    b = bench(seconds=3.0)
+    for number in range(10):
+        b.frame(number)
+    b.worker.initialize(BOX, 5 * SECOND)
+    refused = b.wait_for(lambda outcome: outcome.phase is Phase.REFUSED)
+    assert '4 from 6.000000000 to 9.000000000' in refused.error
+
+
+def test_start_in_the_past_goes_through_what_comes_meanwhile(bench):
+    b = bench()
+    for number in range(4):
+        b.frame(number)
+    b.wait(1)
+    before = len(b.outcomes)
+    b.hold()
+    b.worker.initialize(BOX, SECOND)
+    b.stuck()
+    for number in range(4, 20):
+        b.frame(number)
+    b.tracker.gate.set()
+    b.wait(before + 19)
+    assert b.tracker.calls[-19:] == [('initialize', 1)] + [
+        ('update', number) for number in range(2, 20)]
+
+
+def test_start_in_the_past_catches_up_in_a_bounded_number_of_steps(bench):
+    b = bench(frames=5)
+    for number in range(9):
+        b.frame(number)
+    b.wait(1)
+    b.hold()
+    b.worker.initialize(BOX, 4 * SECOND)
+    b.stuck()
+    for number in range(9, 100):
+        b.frame(number)
+    b.tracker.gate.set()
+    b.wait_for(lambda outcome: outcome.frame.stamp == 99 * SECOND)
+    updates = [number for _, number in b.tracker.calls[1:]]
+    # Four that were kept, five that came meanwhile, then the newest.
+    assert updates == [5, 6, 7, 8, 9, 10, 11, 12, 13, 99]
+
+
+def test_refusals_do_not_pile_up_behind_a_busy_tracker(bench):
+    b = bench()
+    b.frame(5)
+    b.wait(1)
+    b.worker.initialize(BOX)
+    b.wait(2)
+    b.hold()
+    b.frame(6)
+    b.stuck()
+    for _ in range(1000):
+        b.worker.initialize(BOX, SECOND)
+    assert len(b.worker._mailbox._items) == 1
+    b.tracker.gate.set()
+    assert b.wait(4).phase is Phase.REFUSED
+
+
+def test_commands_wait_for_room_where_all_is_kept(bench):
+    b = bench(BoundedMailbox(2))
+    b.worker.initialize(BOX)
+    b.hold()
+    b.frame(0)
+    b.stuck()
+    sender = threading.Thread(target=lambda: [b.worker.reset() for _ in range(50)])
+    sender.start()
+    sender.join(0.1)
+    assert sender.is_alive() and len(b.worker._mailbox._items) == 2
+    b.tracker.gate.set()
+    sender.join(PATIENCE)
+    assert not sender.is_alive()
+
+
+def test_time_with_one_frame_is_told(bench):
+    b = bench()
+    assert b.worker.busy_seconds == 0
+    b.worker.initialize(BOX)
+    b.hold()
+    b.frame(0)
+    b.stuck()
+    first = b.worker.busy_seconds
+    assert 0 <= first <= b.worker.busy_seconds
+    b.tracker.gate.set()
+    b.wait(1)
+    b.worker.stop(PATIENCE)
+    assert b.worker.busy_seconds == 0
 
 
 def test_refused_request_keeps_the_target(bench):

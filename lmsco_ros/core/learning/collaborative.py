@@ -16,7 +16,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 from lmsco_ros.core.backend import Array, array_namespace
 from lmsco_ros.core.fourier.series import half_weights, mean_of_squares, symmetrize
@@ -57,8 +57,8 @@ class CollaborativeOptimizer:
         self._windows = windows
         self._margin_weight = margin_weight
         self.filters = [0 * block[:, :, 0, :] for block in memory.blocks]
-        self._weights = self._flatten([_full_weights(block) for block in self.filters])
-        self._solver = ConjugateGradient(self._inner)
+        self._solver = ConjugateGradient(_inner_product(
+            self._flatten([_full_weights(block) for block in self.filters])))
 
     def optimize(self, outer: int, steps: int) -> None:
         """Run `outer` iterations with `steps` conjugate gradient steps each."""
@@ -101,11 +101,6 @@ class CollaborativeOptimizer:
         """Return C sum_j a_j A_j^H R_j."""
         return self._margin_weight * self._flatten(self._memory.adjoint(residual))
 
-    def _inner(self, left: Array, right: Array) -> float:
-        """Return the real inner product over the whole spectra."""
-        return float(array_namespace(left).real(
-            array_namespace(left).vecdot(left, self._weights * right)))
-
     def _flatten(self, blocks: Sequence[Array]) -> Array:
         """Return the blocks as one vector."""
         xp = array_namespace(blocks[0])
@@ -126,3 +121,13 @@ def _full_weights(block: Array) -> Array:
     """Return how often each half-spectrum coefficient counts, in the shape of `block`."""
     xp = array_namespace(block)
     return xp.broadcast_to(half_weights(block)[None, :, None], block.shape)
+
+
+def _inner_product(weights: Array) -> Callable[[Array, Array], float]:
+    """Return the real inner product over whole spectra whose halves count with `weights`."""
+    xp = array_namespace(weights)
+
+    def inner(left: Array, right: Array) -> float:
+        return float(xp.real(xp.vecdot(left, weights * right)))
+
+    return inner

@@ -1,0 +1,98 @@
+# Copyright 2026 lmsco_ros contributors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""When the GPU has no memory left, the processor takes over."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy.typing as npt
+import torch
+
+from lmsco_ros.core.types import BoundingBox, TrackResult, TrackState
+from lmsco_ros.node.outcome import Tracker
+
+
+class FallbackTracker:
+    """
+    A tracker that is made anew on the processor when the GPU runs out of memory.
+
+    The new one starts on the last frame in which the target was found and goes on from there.
+    It stays on the processor: memory that is short once is short again.
+
+    Parameters
+    ----------
+    make : callable
+        Makes a tracker for the device that it is given; empty stands for the configured one.
+    device : str
+        Where to begin.
+    warn : callable
+        Called with what happened.
+
+    Raises
+    ------
+    torch.cuda.OutOfMemoryError
+        From every method, when there is none on the processor either.
+
+    """
+
+    def __init__(self, make: Callable[[str], Tracker], device: str,
+                 warn: Callable[[str], None]) -> None:
+        self._make = make
+        self._device = device
+        self._warn = warn
+        self._found: tuple[npt.NDArray, BoundingBox] | None = None
+        self._attempt(lambda: self._use(make(device)))
+
+    def initialize(self, image: npt.NDArray, box: BoundingBox) -> TrackResult:
+        """Start on a target."""
+        result = self._attempt(lambda: self._tracker.initialize(image, box)) \
+            or self._tracker.initialize(image, box)
+        return self._noted(image, result)
+
+    def update(self, image: npt.NDArray) -> TrackResult:
+        """Find the target in the next frame."""
+        result = self._attempt(lambda: self._tracker.update(image)) or self._resume(image)
+        return self._noted(image, result)
+
+    def _attempt(self, work: Callable[[], TrackResult | None]) -> TrackResult | None:
+        """Return what comes of the work; None after a retreat to the processor."""
+        try:
+            return work()
+        except torch.cuda.OutOfMemoryError as error:
+            if self._device == 'cpu':
+                raise
+            reason = str(error)
+        # Not in the handler: the error keeps everything alive that the tracker held.
+        self._use(self._make('cpu'))
+        self._device = 'cpu'
+        if torch.cuda.is_available():
+            torch.cuda.empty_cache()
+        self._warn('the GPU ran out of memory; tracking goes on, slower, on the processor until '
+                   f'the node is configured again ({reason})')
+        return None
+
+    def _use(self, tracker: Tracker) -> None:
+        self._tracker = tracker
+
+    def _resume(self, image: npt.NDArray) -> TrackResult:
+        self._tracker.initialize(*self._found)
+        return self._tracker.update(image)
+
+    def _noted(self, image: npt.NDArray, result: TrackResult) -> TrackResult:
+        """Keep the newest frame that shows the target."""
+        if result.state is not TrackState.LOST:
+            self._found = image, result.box
+        return result

@@ -1,0 +1,120 @@
+# Copyright 2026 lmsco_ros contributors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""A GPU without memory costs speed, and nothing else."""
+
+from diagnostic_msgs.msg import DiagnosticArray
+import numpy as np
+import pytest
+import torch
+
+from lmsco_ros.core.types import BoundingBox, TrackState
+from lmsco_ros.node.gpu_fallback import FallbackTracker
+from msg_adapters.status import diagnoses_from_message, Level
+
+OutOfMemory = torch.cuda.OutOfMemoryError
+BOX = BoundingBox(1, 2, 3, 4)
+
+
+def image(value):
+    return np.full((4, 4), value)
+
+
+@pytest.fixture
+def bench(make_fake):
+    """Return a tracker on a fake GPU, the fakes by device, and the warnings."""
+    fakes, warnings = {'cuda': make_fake(), 'cpu': make_fake()}, []
+    return FallbackTracker(fakes.__getitem__, 'cuda', warnings.append), fakes, warnings
+
+
+def calls(fake):
+    return [(name, int(seen[0, 0])) for name, seen in fake.calls]
+
+
+def test_goes_on_from_the_last_frame_that_showed_the_target(bench):
+    tracker, fakes, warnings = bench
+    tracker.initialize(image(0), BOX)
+    fakes['cuda'].states = [TrackState.TRACKING, TrackState.LOST]
+    tracker.update(image(1))
+    tracker.update(image(2))
+    fakes['cuda'].error = OutOfMemory('2 GiB are missing')
+    result = tracker.update(image(3))
+    assert calls(fakes['cpu']) == [('initialize', 1), ('update', 3)]
+    # The box of frame 1 is one pixel right of the first, and frame 3 moves it once more.
+    assert result.box == BoundingBox(3, 2, 3, 4)
+    warning, = warnings
+    assert 'processor' in warning and '2 GiB are missing' in warning
+    tracker.initialize(image(4), BOX)
+    assert calls(fakes['cpu'])[-1] == ('initialize', 4)
+
+
+def test_start_is_repeated_on_the_processor(bench):
+    tracker, fakes, warnings = bench
+    fakes['cuda'].error = OutOfMemory()
+    assert tracker.initialize(image(7), BOX).box == BOX
+    assert calls(fakes['cpu']) == [('initialize', 7)] and len(warnings) == 1
+
+
+def test_tracker_that_does_not_fit_is_made_on_the_processor(make_fake):
+    devices, warnings = [], []
+
+    def make(device):
+        devices.append(device)
+        if device != 'cpu':
+            raise OutOfMemory
+        return make_fake()
+    tracker = FallbackTracker(make, '', warnings.append)
+    assert tracker.initialize(image(0), BOX).box == BOX
+    assert devices == ['', 'cpu'] and len(warnings) == 1
+
+
+def test_no_memory_anywhere_and_other_errors_are_raised(bench):
+    tracker, fakes, _ = bench
+    tracker.initialize(image(0), BOX)
+    fakes['cuda'].error = RuntimeError('other')
+    with pytest.raises(RuntimeError, match='other'):
+        tracker.update(image(1))
+    fakes['cuda'].error, fakes['cpu'].error = OutOfMemory(), OutOfMemory('here neither')
+    with pytest.raises(OutOfMemory, match='here neither'):
+        tracker.update(image(2))
+    fakes['cpu'].error = OutOfMemory('nor now')
+    with pytest.raises(OutOfMemory, match='nor now'):
+        tracker.initialize(image(3), BOX)
+    assert tracker.initialize(image(4), BOX).box == BOX
+
+
+def test_node_goes_on_and_warns_until_it_is_configured_again(run, make_fake):
+    fakes = {'cuda': make_fake(), 'cpu': make_fake()}
+    running = run(tracker_factory=lambda settings: fakes[settings.device], device='cuda')
+    health = running.graph.listen(DiagnosticArray, '/diagnostics')
+    running.start()
+    running.send()
+    fakes['cuda'].error = OutOfMemory()
+    status = running.send()
+    assert (status.state, status.track_id) == ('tracking', 1)
+    assert running.last_box == (11, 12, 8, 6)
+    count = len(health)
+    running.graph.spin_until(lambda: len(health) > count + 1)
+    diagnosis, = diagnoses_from_message(health[-1])
+    assert diagnosis.level == Level.WARN and 'GPU ran out of memory' in diagnosis.message
+    running.node.trigger_deactivate()
+    running.node.trigger_cleanup()
+    running.node.trigger_configure()
+    running.node.trigger_activate()
+    running.graph.spin_until(lambda: running.images.get_subscription_count() == 1)
+    running.send()
+    count = len(health)
+    running.graph.spin_until(lambda: len(health) > count + 1)
+    assert diagnoses_from_message(health[-1])[0].level == Level.OK

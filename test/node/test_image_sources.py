@@ -1,0 +1,100 @@
+# Copyright 2026 lmsco_ros contributors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""A camera that is not heard is named, with the reason, in the log and in the diagnostics."""
+
+from diagnostic_msgs.msg import DiagnosticArray
+import pytest
+from rcl_interfaces.msg import Log
+from rclpy.context import Context
+from rclpy.node import Node
+from rclpy.qos import qos_profile_sensor_data
+from sensor_msgs.msg import CompressedImage, Image
+
+from lmsco_ros.node.image_sources import ImageSource, stale_message, unheard_warning
+from msg_adapters.status import diagnoses_from_message, Level
+
+HEARD, DEAF = ImageSource('/camera', ''), ImageSource('/rig/eye', '(incompatible QoS: so)')
+
+
+@pytest.mark.parametrize('sources, elsewhere, words', [
+    ([], [], ['nobody publishes', 'remap image_raw', 'no other topic']),
+    ([], ['/a/image', '/b/image'], ['nobody publishes', '/a/image, /b/image']),
+    ([DEAF], [], ['/rig/eye (incompatible QoS: so)']),
+    ([HEARD], [], ['/camera could be heard', 'paused', 'network', 'shared-memory']),
+    ([HEARD, DEAF], [], ['/camera could be heard', '/rig/eye (incompatible']),
+])
+def test_silence_is_explained(sources, elsewhere, words):
+    message = stale_message(4.2, '/image_raw', sources, elsewhere)
+    assert message.startswith('no image for 4 s on /image_raw: ')
+    assert all(word in message for word in words), message
+
+
+def test_only_who_is_not_heard_is_named():
+    assert unheard_warning([HEARD], '/image_raw') == ''
+    assert '/camera' not in unheard_warning([HEARD, DEAF], '/image_raw')
+
+
+@pytest.fixture
+def camera(graph):
+    """Return a node of another participant, as a camera driver is."""
+    context = Context()
+    context.init()
+    node = Node('eye', namespace='rig', context=context)
+    yield node
+    node.destroy_node()
+    context.try_shutdown()
+
+
+def diagnosis_with(graph, health, word):
+    """Wait for a diagnosis that holds a word."""
+    graph.spin_until(lambda: health and word in health[-1].status[0].message)
+    diagnosis, = diagnoses_from_message(health[-1])
+    return diagnosis
+
+
+def test_incompatible_publisher_is_named_at_once_and_in_the_diagnostics(graph, camera):
+    log = graph.listen(Log, '/rosout')
+    graph.start_tracker(image_reliability='reliable', no_image_timeout=3600.0)
+    health = graph.listen(DiagnosticArray, '/diagnostics')
+    deaf = camera.create_publisher(Image, '/image_raw', qos_profile_sensor_data)
+    graph.spin_until(lambda: any(
+        '/rig/eye' in entry.msg and 'image_reliability' in entry.msg for entry in log))
+    diagnosis = diagnosis_with(graph, health, '/rig/eye')
+    assert diagnosis.level == Level.WARN
+    assert 'Best effort publisher and reliable subscription' in diagnosis.message
+    camera.destroy_publisher(deaf)
+    graph.spin_until(lambda: '/rig/eye' not in health[-1].status[0].message)
+    assert diagnoses_from_message(health[-1])[0].level == Level.OK
+
+
+def test_publisher_of_another_type_is_named_when_images_are_missing(graph, camera):
+    camera.create_publisher(CompressedImage, '/image_raw', 5)
+    camera.create_publisher(Image, '/rig/image', 5)
+    graph.start_tracker(no_image_timeout=0.1)
+    health = graph.listen(DiagnosticArray, '/diagnostics')
+    diagnosis = diagnosis_with(graph, health, '/rig/eye')
+    assert diagnosis.level == Level.STALE
+    assert 'sensor_msgs/msg/CompressedImage, expected sensor_msgs/msg/Image' in diagnosis.message
+
+
+def test_silence_is_stale_and_points_to_other_images(graph, camera):
+    camera.create_publisher(Image, '/rig/image', 5)
+    graph.start_tracker(no_image_timeout=0.1)
+    health = graph.listen(DiagnosticArray, '/diagnostics')
+    diagnosis = diagnosis_with(graph, health, '/rig/image')
+    assert diagnosis.level == Level.STALE
+    # The node's own pictures are no camera.
+    assert 'nobody publishes' in diagnosis.message and 'overlay' not in diagnosis.message
