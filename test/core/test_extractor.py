@@ -49,8 +49,8 @@ def extractor(backend, size, *blocks, networks=()):
 
 def textures(rng, count, size):
     """Return smooth random patches."""
-    return np.stack([cv2.GaussianBlur(rng.normal(size=(size, size)).astype(np.float32), (0, 0), 1.2)
-                     for _ in range(count)])
+    noise = rng.normal(size=(count, size, size)).astype(np.float32)
+    return np.stack([cv2.GaussianBlur(patch, (0, 0), 1.2) for patch in noise])
 
 
 def flows(rng, count, size):

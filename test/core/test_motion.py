@@ -69,7 +69,8 @@ def test_nothing_is_said_before_there_was_a_frame(ground, figure):
 
 
 @pytest.mark.parametrize('region', [
-    BoundingBox(20.8, 31.7, 90, 90), BoundingBox(20.3, 30, 90, 90), BoundingBox(20.3, 31.7, 91, 91)])
+    BoundingBox(20.8, 31.7, 90, 90), BoundingBox(20.3, 30, 90, 90),
+    BoundingBox(20.3, 31.7, 91, 91)])
 def test_nothing_is_said_of_another_region(ground, figure, region):
     seen = observer(sight(ground, figure))
     assert seen.images(region, sight(ground, figure, (50, 54)), [1.0]) is None

@@ -66,16 +66,16 @@ def test_projection_is_learned_from_the_first_sample_that_is_not_zero(rng, backe
     silent = projection(backend.asarray(np.zeros_like(second)))
     assert silent.shape == (1, 7, 7, 3) and not to_numpy(silent).any()
     matrix = principal_components(first, 3)
-    for given in (first, second, np.zeros_like(first), first):
-        projected = projection(backend.asarray(given))
-        assert isinstance(projected, type(backend.asarray(given)))
+    for sample in (first, second, np.zeros_like(first), first):
+        projected = projection(backend.asarray(sample))
+        assert isinstance(projected, type(backend.asarray(sample)))
         assert to_numpy(projected).dtype == np.float32
-        np.testing.assert_allclose(to_numpy(projected), given @ matrix, rtol=1e-5, atol=1e-5)
+        np.testing.assert_allclose(to_numpy(projected), sample @ matrix, rtol=1e-5, atol=1e-5)
 
 
 def test_more_components_than_channels_keep_all(rng):
-    given = channels(rng, 4)
-    projected = Projection(9, NUMPY)(given)
-    assert projected.shape == given.shape
-    np.testing.assert_allclose(np.sum(projected**2, axis=-1), np.sum(given**2, axis=-1),
+    sample = channels(rng, 4)
+    projected = Projection(9, NUMPY)(sample)
+    assert projected.shape == sample.shape
+    np.testing.assert_allclose(np.sum(projected**2, axis=-1), np.sum(sample**2, axis=-1),
                                rtol=1e-4)
