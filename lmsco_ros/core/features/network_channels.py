@@ -99,10 +99,8 @@ class NetworkChannels:
         found = self._network.layers[layer]
         first = found.first_cell(self._network.margin)
         inside = slice(first, first + self._size // cell * cell // found.stride)
-        maps = maps[:, :, inside, inside]
-        if cell > found.stride:
-            maps = torch.nn.functional.avg_pool2d(maps, cell // found.stride)
-        channels = maps.permute(0, 2, 3, 1).contiguous()
+        rows = maps[:, :, inside, inside].permute(0, 2, 3, 1)
+        channels = _average(rows, cell // found.stride).contiguous()
         return channels.numpy() if self._device.type == 'cpu' else channels
 
 
@@ -123,3 +121,14 @@ def _check_cell(network: Backbone, layer: str, cell: int) -> None:
         raise ConfigError(f'FeatureConfig.cell is {cell}, but layer {layer} of '
                           f'{type(network).__name__} has cells of {stride} pixels; '
                           f'expected a multiple of {stride}')
+
+
+def _average(maps: torch.Tensor, side: int) -> torch.Tensor:
+    """Return the means of squares of `side` by `side` cells, shape (n, H, W, C)."""
+    if side == 1:
+        return maps
+    parts = [maps[:, row::side, column::side] for row in range(side) for column in range(side)]
+    total = parts[0] + parts[1]
+    for part in parts[2:]:
+        total += part
+    return total.div_(side**2)
