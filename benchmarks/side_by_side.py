@@ -44,8 +44,8 @@ from lmsco_ros.evaluation.errors import TrackerError
 from lmsco_ros.evaluation.geometry import is_absent, overlaps
 from lmsco_ros.evaluation.session import Request, select_sequences
 from lmsco_ros.evaluation.trackers import resolve
+from lmsco_ros.evaluation.trackers.configured import ConfiguredTracker
 from lmsco_ros.evaluation.trackers.interface import Answer, Tracker
-from lmsco_ros.evaluation.trackers.preset import PresetTracker
 
 
 @dataclass(frozen=True)
@@ -84,7 +84,7 @@ def build_tracker(name: str) -> Tracker:
     """
     if Path(name).suffix in ('.yaml', '.yml'):
         try:
-            return PresetTracker(load_config(name))
+            return ConfiguredTracker(load_config(name))
         except LMSCOError as error:
             raise TrackerError(f'{name} cannot be built: {error}') from error
     return resolve(name).build()

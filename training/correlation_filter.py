@@ -140,7 +140,7 @@ class CorrelationFilter:
 
     @staticmethod
     def scores(sample: torch.Tensor, filters: torch.Tensor) -> torch.Tensor:
-        """Return the scores (n, N, N) of one spectrum (n, C, N, N // 2 + 1) per target."""
+        """Return scores, shape (n, N, N), of a spectrum (n, C, N, N // 2 + 1) per target."""
         cells = sample.shape[-2]
         product = (sample * filters).sum(dim=1)
         return torch.fft.irfft2(product, s=(cells, cells)) * cells**2

@@ -59,8 +59,9 @@ def evaluate(
         help='Folder for records, plots and report.html; finished work in it is kept.')],
     tracker: Annotated[Optional[list[str]], typer.Option(
         show_default='all that work here',
-        help='Preset, csrt, kcf, mil, mosse, medianflow, nanotrack:BACKBONE,HEAD, vit:NET, '
-             'trax:NAME=COMMAND or python:MODULE:CALLABLE. May be repeated.')] = None,
+        help='Preset, config:FILE (YAML), csrt, kcf, mil, mosse, medianflow, '
+             'nanotrack:BACKBONE,HEAD, vit:NET, trax:NAME=COMMAND or python:MODULE:CALLABLE. '
+             'May be repeated.')] = None,
     protocol: Annotated[Protocol, typer.Option(
         help='ope: one pass; vot: start again after each failure.')] = Protocol.OPE,
     sequences: Annotated[str, typer.Option(

@@ -97,8 +97,10 @@ class ConfidenceMonitor:
         return self._state
 
     def quality(self, sharpness: float) -> float:
-        """Return the sharpness as a part of the reference."""
-        return sharpness / float(np.median(self._reference)) if self._reference else 1.0
+        """Return the sharpness as a part of the reference; 1 as long as there is none."""
+        if not self._reference:
+            return float(sharpness > 0)
+        return sharpness / float(np.median(self._reference))
 
     def convincing(self, evidence: Evidence) -> bool:
         """Return whether a frame shows the target even where it was not expected."""
@@ -119,7 +121,7 @@ class ConfidenceMonitor:
             certain = (self.quality(evidence.sharpness) >= self.config.uncertain
                        and evidence.presence >= self.config.present)
             self._state = TrackState.TRACKING if certain else TrackState.UNCERTAIN
-            if len(self._reference) < self.config.reference_frames:
+            if evidence.sharpness > 0 and len(self._reference) < self.config.reference_frames:
                 self._reference.append(evidence.sharpness)
         else:
             self._misses += 1

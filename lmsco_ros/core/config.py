@@ -82,6 +82,10 @@ class TrackerConfig:
         if not self.features:
             raise ConfigError('TrackerConfig.features is empty; name at least one block, '
                               'for instance {channels: [{kind: hog}]}')
+        if all(group.kind == 'motion' for block in self.features for group in block.channels):
+            raise ConfigError('TrackerConfig.features has motion channels only, which show '
+                              'nothing in the first frame; add a block of appearance, hog or '
+                              'intensity')
         if _FEWEST_CELLS * self.cell > self.sampling.patch_size_max:
             raise ConfigError(f'a patch of {self.sampling.patch_size_max} pixels has less than '
                               f'{_FEWEST_CELLS} cells of {self.cell} pixels, the least common '

@@ -48,7 +48,7 @@ class ScaleEstimator(Protocol):
     search_factors: tuple[float, ...]
 
     def found_factor(self, values: np.ndarray) -> float:
-        """Return the scale of the target, given the best score at each of `search_factors`."""
+        """Return the scale of the target, given the best score at each scale searched."""
 
     def learn(self, view: FrameView, box: BoundingBox) -> None:
         """Learn what the target at `box` looks like at its neighboring scales."""
@@ -95,8 +95,12 @@ class ScaleSearch(FixedScale):
         self.search_factors = scale_factors(config)
 
     def found_factor(self, values: np.ndarray) -> float:
-        """Return the scale at the maximum of the parabola through the best scores."""
-        return _best_factor(self._config, values)
+        """
+        Return the scale at the maximum of the parabola through the best scores.
+
+        One score, of a search at the last size, says nothing of the scale.
+        """
+        return _best_factor(self._config, values) if len(values) > 1 else 1.0
 
 
 class ScaleFilter(FixedScale):

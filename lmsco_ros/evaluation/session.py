@@ -16,6 +16,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from dataclasses import dataclass
 from datetime import date
 from fnmatch import fnmatch
@@ -110,10 +111,14 @@ def build_trackers(names: Sequence[str]) -> tuple[TrackerSpec, ...]:
     Raises
     ------
     TrackerError
-        When one is unknown or cannot be built here.
+        When one is unknown or cannot be built here, or two have the same name.
 
     """
     specs = tuple(resolve(name) for name in dict.fromkeys(names))
+    for name, count in Counter(spec.name for spec in specs).items():
+        if count > 1:
+            raise TrackerError(f'{count} trackers are called {name!r}, which is what tables and '
+                               'folders tell them apart by; rename the file or the tracker')
     for spec in specs:
         spec.build().close()
     return specs

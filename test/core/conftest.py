@@ -304,3 +304,24 @@ def make_scene():
 def box_at():
     """Return the box of a scene's target."""
     return lambda center, target=(24.0, 18.0): BoundingBox.from_center(center, target)
+
+
+@pytest.fixture(scope='session')
+def random_network():
+    """Return a function of a network class to a network with random weights, always the same."""
+    def make(architecture, seed=5):
+        generator = np.random.default_rng(seed)
+        arrays = {}
+        for name, shape in architecture.file_shapes().items():
+            spread = (2 / np.prod(shape[1:]))**0.5 if len(shape) > 1 else 0.1
+            arrays[name] = generator.normal(0, spread, shape).astype(np.float32)
+        return architecture.from_arrays(arrays)
+    return make
+
+
+@pytest.fixture
+def random_weights(monkeypatch, random_network):
+    """Let every name of the registry stand for its network with random weights."""
+    from lmsco_ros.core.backbones import weights
+    monkeypatch.setattr(weights, 'load_backbone', lambda name, directory=None: random_network(
+        weights.find_source(name).architecture))

@@ -23,12 +23,14 @@ import pytest
 
 from lmsco_ros.core.backend import (
     Backend, irfft2, real_matmul, rfft2, select_backend, to_numpy)
-from lmsco_ros.core.config import ChannelConfig, FeatureConfig, LearningConfig, RuntimeConfig
+from lmsco_ros.core.config import (
+    ChannelConfig, FeatureConfig, LearningConfig, RuntimeConfig, TrackerConfig)
 from lmsco_ros.core.errors import ConfigError
 from lmsco_ros.core.features.extractor import FeatureExtractor
 from lmsco_ros.core.fourier.localization import centered_map, locate
 from lmsco_ros.core.fourier.series import shift
 from lmsco_ros.core.learning.structured_operator import StructuredOperator
+from lmsco_ros.core.networks import Networks
 
 TOLERANCE = {'float32': 1e-4, 'float64': 1e-9}
 FEATURES = (FeatureConfig((ChannelConfig('hog'), ChannelConfig('intensity', 2.0)), cell=4),
@@ -47,15 +49,13 @@ def track_once(backend, learning):
     """Learn two patches and find a third: scores, filters, objective and peak."""
     rng = np.random.default_rng(5)
     patch = rng.normal(size=(72, 72)).astype(np.float32)
-    extractor = FeatureExtractor(FEATURES, 72, backend)
-    sample = extractor(patch)
+    extractor = FeatureExtractor(TrackerConfig(features=FEATURES), Networks(), 72, backend)
+    samples = extractor(np.stack([patch, np.roll(patch, (4, -8), axis=(0, 1))]))
+    sample = [block[:, :, 0] for block in samples]
     operator = StructuredOperator(learning, sample, (0.2, 0.25), backend)
     operator.remember([shift(block, (0.01, -0.02)) for block in sample])
     operator.train()
-    moved = extractor(np.roll(patch, (4, -8), axis=(0, 1)))
-    stacked = [backend.namespace.stack([a, b], axis=2)
-               for a, b in zip(sample, moved, strict=True)]
-    scores = operator.scores(stacked)
+    scores = operator.scores(samples)
     peak = locate(scores[:, :, 1:], 21, 5)
     return ([to_numpy(block) for block in operator.filters], to_numpy(scores),
             operator.objective(), peak)
@@ -90,11 +90,12 @@ def test_torch_gives_the_result_of_numpy(dtype, anchor, solve):
 def test_running_precision_is_kept(dtype):
     backend = Backend(numpy_namespace, 'cpu', dtype)
     patch = np.random.default_rng(5).normal(size=(36, 36)).astype(np.float32)
-    block, = FeatureExtractor(FEATURES[:1], 36, backend)(patch)
-    operator = StructuredOperator(LearningConfig(initial_iterations=2), [block], (0.2, 0.2),
-                                  backend)
+    config = TrackerConfig(features=FEATURES[:1])
+    block, = FeatureExtractor(config, Networks(), 36, backend)(patch[None])
+    operator = StructuredOperator(LearningConfig(initial_iterations=2), [block[:, :, 0]],
+                                  (0.2, 0.2), backend)
     assert block.dtype == operator.filters[0].dtype == backend.complex
-    assert operator.scores([block[:, :, None]]).dtype == backend.complex
+    assert operator.scores([block]).dtype == backend.complex
 
 
 @pytest.mark.parametrize('make', [lambda d: Backend(numpy_namespace, 'cpu', d), torch_backend])
@@ -138,7 +139,7 @@ def test_missing_devices_are_refused(monkeypatch, name):
 
 
 def test_missing_device_of_a_configuration_is_refused(monkeypatch):
-    from lmsco_ros.core import LMSCOTracker, TrackerConfig
+    from lmsco_ros.core import LMSCOTracker
     torch = pytest.importorskip('torch')
     monkeypatch.setattr(torch.cuda, 'is_available', lambda: False)
     with pytest.raises(ConfigError, match='cuda'):

@@ -22,22 +22,29 @@ import yaml
 
 from lmsco_ros.core import ConfigError, TrackerConfig
 from lmsco_ros.core.config import (
-    ChannelConfig, ConfidenceConfig, FeatureConfig, IntensityConfig, LearningConfig, RuntimeConfig,
-    SamplingConfig, ScaleConfig)
+    ChannelConfig, ConfidenceConfig, FeatureConfig, IntensityConfig, LearningConfig, MotionConfig,
+    NetworkConfig, RegistrationConfig, RuntimeConfig, SamplingConfig, ScaleConfig)
 
+weights = st.floats(0.01, 100)
+words = st.text(st.characters(codec='utf-8', exclude_categories=['Cc', 'Cs']), min_size=1)
+channels = st.builds(ChannelConfig, st.sampled_from(['hog', 'intensity']), weights) | st.builds(
+    ChannelConfig, st.sampled_from(['appearance', 'motion']), weights, words)
 features = st.builds(
-    FeatureConfig, st.lists(
-        st.builds(ChannelConfig, st.sampled_from(['hog', 'intensity']), st.floats(0.01, 100)),
-        min_size=1, max_size=2).map(tuple),
-    cell=st.sampled_from([2, 4, 8]))
+    FeatureConfig, st.lists(channels, min_size=1, max_size=2).map(tuple),
+    cell=st.sampled_from([2, 4, 8]), projection=st.integers(0, 4096))
 configs = st.builds(
     TrackerConfig,
-    features=st.lists(features, min_size=1, max_size=3).map(tuple),
+    features=st.lists(features, min_size=1, max_size=3).map(tuple).filter(
+        lambda blocks: {group.kind for block in blocks for group in block.channels} != {'motion'}),
     intensity=st.builds(IntensityConfig, low_percentile=st.floats(0, 49),
                         high_percentile=st.floats(51, 100), jump=st.floats(0, 1)),
     sampling=st.builds(SamplingConfig, search_factor=st.floats(1.5, 10),
                        patch_size_min=st.integers(64, 200),
                        patch_size_max=st.integers(200, 1024)),
+    networks=st.builds(NetworkConfig, words, words, words | st.just('')),
+    motion=st.builds(MotionConfig, st.booleans(), st.floats(0, 100)),
+    registration=st.builds(RegistrationConfig, words | st.just(''), st.floats(0, 1),
+                           st.floats(0, 1), st.floats(0, 2)),
     learning=st.builds(LearningConfig, anchor=st.sampled_from(['unit', 'coupled', 'frozen']),
                        solve=st.sampled_from(['joint', 'per_block']), core=st.floats(0, 1),
                        window_minimum=st.floats(1e-6, 1), window_edge=st.floats(1, 1e3),
@@ -46,7 +53,8 @@ configs = st.builds(
                     step=st.floats(1.001, 1.15), exponent_min=st.integers(-9, 0),
                     exponent_max=st.integers(0, 9)),
     confidence=st.builds(ConfidenceConfig, lost=st.floats(0, 0.1),
-                         uncertain=st.floats(0.1, 1), found=st.floats(0.1, 2)),
+                         uncertain=st.floats(0.1, 1), found=st.floats(0.1, 2),
+                         absent=st.floats(0, 0.3), present=st.floats(0.3, 1)),
     runtime=st.builds(RuntimeConfig, device=st.sampled_from(['cpu', 'cuda', 'cuda:1']),
                       threads=st.integers(1, 256)),
     newton_steps=st.integers(0, 100))
@@ -79,11 +87,30 @@ def test_presets_are_valid_and_plain(name):
 
 
 def test_named_presets_exist():
-    assert {'default', 'hcs'} <= set(TrackerConfig.preset_names())
+    assert {'default', 'paper', 'mas', 'ma', 'a', 'hcs'} == set(TrackerConfig.preset_names())
     with pytest.raises(ConfigError, match="unknown preset 'hsc'; expected one of .*hcs"):
         TrackerConfig.preset('hsc')
     with pytest.raises(ConfigError, match='unknown preset'):
         TrackerConfig.from_dict({'preset': 'nothing'})
+
+
+def differences(one, other):
+    """Return the settings in which two presets differ."""
+    one, other = (TrackerConfig.preset(name).to_dict() for name in (one, other))
+    return {name for name in one if one[name] != other[name]}
+
+
+def test_presets_of_the_ablation_are_one_factor_apart():
+    assert differences('paper', 'mas') == set()
+    assert differences('mas', 'ma') == {'scale'}
+    assert differences('ma', 'a') == {'features'}
+    assert differences('mas', 'hcs') == {'features'}
+    appearance, motion_too = (TrackerConfig.preset(name).features for name in ('a', 'ma'))
+    assert motion_too[:-1] == appearance
+    assert {group.kind for block in appearance for group in block.channels} == {'appearance'}
+    assert [group.kind for group in motion_too[-1].channels] == ['motion']
+    assert TrackerConfig.preset('ma').scale.estimator == 'none'
+    assert TrackerConfig.preset('paper').scale.estimator == 'search'
 
 
 def test_partial_configuration_changes_only_what_it_names():
@@ -124,6 +151,10 @@ def test_given_mapping_is_left_alone():
     ({'features': [{'channels': [], 'cels': 3}]}, r'features\[0\].cels', 'cell'),
     ({'features': [{'channels': [{'knd': 'hog'}]}]},
      r'features\[0\].channels\[0\].knd', 'kind'),
+    ({'features': [{'channels': [{'kind': 'motion', 'layr': 'deep'}]}]},
+     r'features\[0\].channels\[0\].layr', 'layer'),
+    ({'networks': {'motion_backbon': 'x'}}, 'networks.motion_backbon', 'motion_backbone'),
+    ({'motion': {'least_motoin': 1}}, 'motion.least_motoin', 'least_motion'),
     ({'newton_step': 3}, 'newton_step', 'newton_steps'),
     ({7: 3}, '7', ''),
 ])
@@ -132,7 +163,8 @@ def test_unknown_key_names_the_nearest(data, path, nearest):
         TrackerConfig.from_dict(data)
 
 
-@given(config=configs, section=st.sampled_from(['learning', 'scale', 'sampling']),
+@given(config=configs, section=st.sampled_from(
+    ['learning', 'scale', 'sampling', 'networks', 'motion']),
        position=st.integers(0, 40), letter=st.sampled_from('qzx'))
 def test_misspelled_key_is_found_again(config, section, position, letter):
     data = config.to_dict()
@@ -157,6 +189,8 @@ def test_misspelled_key_is_found_again(config, section, position, letter):
     ({'features': [{'channels': 'hog'}]}, r"features\[0\].channels is 'hog'; expected a list"),
     ({'features': [{'channels': [3]}]}, r'channels\[0\] is 3; expected keys and values'),
     ({'features': [{'channels': [{'kind': 3}]}]}, r'channels\[0\].kind is 3; expected a str'),
+    ({'networks': {'appearance_backbone': 3}}, 'appearance_backbone is 3; expected a str'),
+    ({'motion': {'remove_camera_motion': 1}}, 'remove_camera_motion is 1; expected a bool'),
     ({'features': []}, 'features is empty; name at least one block'),
 ])
 def test_wrong_types_are_refused(data, reason):
@@ -180,6 +214,10 @@ BOUNDS = [
     (ScaleConfig, 'exponent_max', -1, 51), (ScaleConfig, 'learning_rate', -0.1, 1.1),
     (ScaleConfig, 'model_area', 63, 65537), (ScaleConfig, 'padding', 0.9, 4.1),
     (ScaleConfig, 'regularization', 0, 101), (ScaleConfig, 'label_sigma', 0, 51),
+    (MotionConfig, 'least_motion', -0.1, 101),
+    (RegistrationConfig, 'center_rate', -0.1, 1.1), (RegistrationConfig, 'size_rate', -0.1, 1.1),
+    (RegistrationConfig, 'tolerance', -0.1, 2.1), (ConfidenceConfig, 'absent', -0.1, 1.1),
+    (ConfidenceConfig, 'present', 0, 1.1),
     (ConfidenceConfig, 'reference_frames', 0, 1001), (ConfidenceConfig, 'lost_frames', 0, 1001),
     (ConfidenceConfig, 'tiles', -1, 65), (RuntimeConfig, 'threads', 0, 257),
     (TrackerConfig, 'newton_steps', -1, 101),
@@ -200,6 +238,7 @@ def test_bounds_name_the_field_the_value_and_the_range(kind, name, low, high):
     {'learning': {'window_minimum': 0.5, 'window_edge': 0.1}},
     {'confidence': {'lost': 0.5, 'uncertain': 0.3, 'found': 0.6}},
     {'confidence': {'lost': 0.5, 'uncertain': 0.6, 'found': 0.3}},
+    {'confidence': {'absent': 0.5, 'present': 0.3}},
 ])
 def test_ranges_must_not_be_turned_round(values):
     with pytest.raises(ConfigError, match='expected a value in'):
@@ -211,6 +250,8 @@ def test_ranges_must_not_be_turned_round(values):
       'features': [{'channels': [{'kind': 'hog'}], 'cell': 16}]}, '64 pixels .* cells of 16'),
     ({'features': [{'channels': [{'kind': 'hog'}], 'cell': cell} for cell in (7, 11)]},
      'cells of 77 pixels'),
+    ({'features': [{'channels': [{'kind': 'motion', 'layer': 'deep'}], 'cell': 16}]},
+     'motion channels only, which show nothing in the first frame; add a block of appearance'),
     ({'scale': {'step': 2, 'exponent_max': 50}}, 'reach a factor of 1.1259e\\+15'),
 ])
 def test_values_that_do_not_go_together_are_refused(values, words):
@@ -233,7 +274,13 @@ def test_choices_are_listed(section, name, choices):
     ({'channels': [{'kind': 'hog'}], 'cell': 0}, r'FeatureConfig.cell is 0; expected'),
     ({'channels': [{'kind': 'hog'}], 'cell': 33}, r'FeatureConfig.cell is 33; expected'),
     ({'channels': [{'kind': 'hog', 'weight': 0}]}, r'ChannelConfig.weight is 0.*; expected'),
-    ({'channels': [{'kind': 'color'}]}, "kind is 'color'; expected one of hog, intensity"),
+    ({'channels': [{'kind': 'hog'}], 'projection': -1}, r'FeatureConfig.projection is -1; exp'),
+    ({'channels': [{'kind': 'hog'}], 'projection': 4097}, r'projection is 4097; expected'),
+    ({'channels': [{'kind': 'color'}]},
+     "kind is 'color'; expected one of hog, intensity, appearance, motion"),
+    ({'channels': [{'kind': 'motion'}]}, "layer is '' for kind 'motion'; expected a layer such"),
+    ({'channels': [{'kind': 'hog', 'layer': 'deep'}]},
+     "layer is 'deep' for kind 'hog'; expected .*none for the others"),
 ])
 def test_features_are_checked(block, reason):
     with pytest.raises(ConfigError, match=reason):

@@ -20,11 +20,8 @@ import cv2
 import numpy as np
 import pytest
 
-from lmsco_ros.core.config import ChannelConfig, FeatureConfig
-from lmsco_ros.core.features.extractor import FeatureExtractor, hann_window, normalize
 from lmsco_ros.core.features.hog import hog, HOG_CHANNELS
 from lmsco_ros.core.features.intensity_channels import intensity_channels
-from lmsco_ros.core.fourier.series import mean_of_squares
 
 
 def cell_histograms(patch, cell):
@@ -134,44 +131,3 @@ def test_intensity_channels_know_no_offset(rng):
     patch = rng.normal(size=(20, 20)).astype(np.float32)
     np.testing.assert_allclose(intensity_channels(patch + 3, 4), intensity_channels(patch, 4),
                                atol=1e-5)
-
-
-def test_normalization_is_to_unit_mean_square(rng):
-    channels = rng.normal(size=(5, 5, 3)).astype(np.float32) * 17
-    assert np.mean(normalize(channels)**2) == pytest.approx(1, rel=1e-5)
-    np.testing.assert_allclose(normalize(channels / 100), normalize(channels), rtol=1e-5)
-    np.testing.assert_array_equal(normalize(np.zeros((4, 4, 2), np.float32)), 0)
-
-
-def test_window_has_no_zero_ends():
-    window = hann_window(9)
-    assert window.shape == (9, 9)
-    n = np.arange(1, 10)
-    axis = np.sin(np.pi * n / 10)**2
-    np.testing.assert_allclose(window, axis[:, None] * axis[None, :], atol=1e-12)
-
-
-def test_blocks_have_the_order_and_resolution_of_the_configuration(backend, rng):
-    blocks = (FeatureConfig((ChannelConfig('hog'), ChannelConfig('intensity')), cell=4),
-              FeatureConfig((ChannelConfig('intensity'),), cell=8))
-    series = FeatureExtractor(blocks, 72, backend)(texture(rng, (72, 72)))
-    assert [s.shape for s in series] == [(17, 9, 33), (9, 5, 2)]
-
-
-def test_weight_scales_a_group(backend, rng):
-    patch = texture(rng, (36, 36))
-    one, two = (FeatureExtractor([FeatureConfig(
-        (ChannelConfig('hog'), ChannelConfig('intensity', weight)), 4)], 36, backend)(patch)[0]
-        for weight in (1.0, 2.5))
-    np.testing.assert_allclose(two[:, :, :31], one[:, :, :31], atol=1e-6)
-    np.testing.assert_allclose(two[:, :, 31:], 2.5 * one[:, :, 31:], atol=1e-5)
-
-
-def test_groups_share_a_block_at_equal_strength(backend, rng):
-    patch = texture(rng, (60, 60))
-    groups = (ChannelConfig('hog'), ChannelConfig('intensity'))
-    together, = FeatureExtractor([FeatureConfig(groups, 4)], 60, backend)(patch)
-    for group, part in zip(groups, (together[:, :, :31], together[:, :, 31:]), strict=True):
-        alone, = FeatureExtractor([FeatureConfig((group,), 4)], 60, backend)(patch)
-        np.testing.assert_allclose(part, alone, atol=1e-6)
-        assert 0.01 < mean_of_squares(part).mean() < 1

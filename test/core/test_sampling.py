@@ -157,10 +157,10 @@ def test_region_is_a_square_around_the_target(cx, cy, w, h, factor):
 
 
 def is_fast(number):
-    """Return whether an odd number has no prime factor above 11."""
+    """Return whether an odd number has no prime factor above 13."""
     factors = [p for p in range(2, number + 1) if number % p == 0
                and all(p % q for q in range(2, p))]
-    return number % 2 == 1 and all(p <= 11 for p in factors)
+    return number % 2 == 1 and all(p <= 13 for p in factors)
 
 
 @given(w=st.floats(2, 300), h=st.floats(2, 300), low=st.integers(60, 250),

@@ -35,6 +35,9 @@ CONFIG = TrackerConfig(
         initial_iterations=30, iterations=3, gradient_steps=2, update_interval=5),
     scale=ScaleConfig(estimator='filter', step=1.03, exponent_min=-8, exponent_max=8),
     newton_steps=5)
+HANDCRAFTED = TrackerConfig.from_dict({
+    'preset': 'hcs', 'sampling': {'patch_size_min': 140, 'patch_size_max': 140},
+    'scale': {'estimator': 'filter', 'step': 1.02, 'exponent_min': -8, 'exponent_max': 8}})
 SEARCH = replace(CONFIG, scale=ScaleConfig(
     estimator='search', step=1.01, exponent_min=-2, exponent_max=2))
 SIZE = (24.0, 18.0)
@@ -150,15 +153,15 @@ def test_target_is_lost_and_found_again_elsewhere(make_scene, elsewhere):
         assert result.state is TrackState.TRACKING
     trusted = result.box
     states = []
-    for _ in range(5):
-        gone = tracker.update(scene.frame())
+    for n in range(5):
+        gone = tracker.update(scene.frame(pan=(n / 10, 0)))
         states.append(gone.state)
     assert TrackState.TRACKING not in states[1:]
     assert states[-1] is TrackState.LOST
     assert gone.box.overlap(trusted) > 0.5
     assert gone.score < 0.5 * result.score + 0.25
-    for _ in range(6):
-        back = tracker.update(scene.frame(elsewhere))
+    for n in range(6):
+        back = tracker.update(scene.frame(elsewhere, pan=(n / 10, 0)))
     assert back.state is TrackState.TRACKING
     assert back.box.center == pytest.approx(elsewhere, abs=1.0)
 
@@ -191,7 +194,7 @@ def test_real_sequences(test_data, name, bound):
         pytest.skip(f'no sequence {folder}')
     count = 60
     frames, boxes = real_frames(folder, count), real_boxes(folder, count)
-    tracker = LMSCOTracker(TrackerConfig.preset('hcs'))
+    tracker = LMSCOTracker(HANDCRAFTED)
     overlaps = [tracker.initialize(frames[0], boxes[0]).box.overlap(boxes[0])]
     overlaps += [tracker.update(frame).box.overlap(box)
                  for frame, box in zip(frames[1:], boxes[1:], strict=True)]

@@ -85,6 +85,15 @@ def test_challenges_have_records_and_tables_of_their_own(lmsco, dataset, scripte
     assert '## dead_pixels: dead pixels, rows' in table.read_text(encoding='utf-8')
 
 
+def test_a_configuration_is_evaluated_beside_its_preset(lmsco, dataset, tmp_path):
+    (tmp_path / 'no_scale.yaml').write_text('preset: hcs\nscale: {estimator: none}\n')
+    output = tmp_path / 'out'
+    result = lmsco('evaluate', dataset, '--output', output, '--sequences', 'ste*', '--frames', 3,
+                   '--tracker', f'config:{tmp_path}/no_scale.yaml', '--tracker', 'hcs')
+    assert result.exit_code == 0, result.output
+    assert {path.parent.name for path in output.rglob('records/**/*.json')} == {'hcs', 'no_scale'}
+
+
 def test_sequences_and_frames_narrow_the_work_of_a_preset(lmsco, dataset, tmp_path):
     output = tmp_path / 'out'
     result = lmsco('evaluate', dataset, '--tracker', 'hcs', '--output', output,

@@ -14,6 +14,8 @@
 
 """Peers behind the one interface, and names that find them."""
 
+import pickle
+
 import cv2
 import numpy as np
 import pytest
@@ -21,7 +23,7 @@ import pytest
 from lmsco_ros.core import BoundingBox, ConfigError, TrackerConfig
 from lmsco_ros.evaluation.errors import TrackerError
 from lmsco_ros.evaluation.session import build_trackers, buildable_trackers
-from lmsco_ros.evaluation.trackers import available_names, preset, resolve
+from lmsco_ros.evaluation.trackers import available_names, configured, resolve
 from lmsco_ros.evaluation.trackers.opencv_image import EightBitView
 from lmsco_ros.evaluation.trackers.opencv_peer import OPENCV_NAMES, OpenCVSpec, OpenCVTracker
 
@@ -112,16 +114,73 @@ def test_every_preset_is_found_by_name():
         assert name in available_names()
 
 
-def test_identity_follows_settings(monkeypatch):
-    name, *others = TrackerConfig.preset_names()
-    assert resolve(name).identity == resolve(name).identity
-    assert resolve('mil').identity != resolve(name).identity
+@pytest.fixture
+def config_file(tmp_path):
+    """Return a function that writes a configuration and returns what names it as a tracker."""
+    def write(text, name='mine.yaml'):
+        (tmp_path / name).write_text(text)
+        return f'config:{tmp_path / name}'
+    return write
+
+
+def test_a_configuration_in_a_file_is_a_tracker_of_its_own(config_file):
+    spec = resolve(config_file('preset: hcs\nscale: {estimator: none}\n', 'no_scale.v2.yaml'))
+    assert spec.name == 'no_scale.v2'
+    assert spec.config == TrackerConfig.from_dict(
+        {'preset': 'hcs', 'scale': {'estimator': 'none'}})
+    sent = pickle.loads(pickle.dumps(spec))
+    assert sent == spec and sent.identity == spec.identity
+    tracker = sent.build()
+    tracker.initialize(scene(0), START)
+    assert tracker.update(scene(1)).box.size == pytest.approx((20, 20))
+
+
+def test_identity_follows_settings_and_code(monkeypatch, config_file):
+    assert resolve('hcs').identity == resolve('hcs').identity
+    # The same settings, however they are written; the name of the file is not one of them.
+    same = resolve(config_file('preset: hcs\nscale: {estimator: search}\n'))
+    assert same.identity == resolve('hcs').identity
+    others = [resolve(config_file(f'preset: hcs\n{text}\n')) for text in (
+        'newton_steps: 4', 'motion: {least_motion: 0.4}', 'runtime: {threads: 2}')]
+    others += [resolve('mil'), resolve('default')]
+    assert len({spec.identity for spec in (same, *others)}) == 6
+    before = same.identity
+    monkeypatch.setattr(configured, 'core_version', lambda: 'another')
+    assert same.identity != before
+
+
+@pytest.mark.parametrize('text, reason', [
+    ('preset: hsc', "unknown preset 'hsc'"), ('- 1', 'holds list; expected keys and values'),
+    ('scale: {stp: 2}', "unknown key 'scale.stp'; did you mean 'step'")])
+def test_wrong_configurations_say_why(config_file, text, reason):
+    with pytest.raises(ConfigError, match=reason):
+        resolve(config_file(text))
+
+
+def test_missing_configuration_is_named():
+    with pytest.raises(ConfigError, match='cannot read the configuration .*nowhere.yaml'):
+        resolve('config:/tmp/nowhere.yaml')
+    with pytest.raises(TrackerError, match='there is no tracker .*config:FILE'):
+        resolve('config:')
+
+
+def test_two_trackers_of_one_name_are_refused(config_file):
+    name = config_file('preset: hcs\nnewton_steps: 1', 'hcs.yaml')
+    assert [spec.name for spec in build_trackers([name, name])] == ['hcs']
+    with pytest.raises(TrackerError, match="2 trackers are called 'hcs'.*rename the file"):
+        build_trackers(['hcs', name])
+
+
+def test_a_configuration_that_cannot_be_built_is_named(config_file):
+    name = config_file('preset: paper\nnetworks: {directory: /nowhere}', 'far.yaml')
+    with pytest.raises(TrackerError, match="'far' cannot be built: the weights vgg_m_2048 are"):
+        build_trackers([name])
 
 
 def test_a_preset_that_lacks_something_is_left_out_with_the_reason(monkeypatch):
     def refuse(config):
         raise ConfigError('its weights are missing')
-    monkeypatch.setattr(preset, 'LMSCOTracker', refuse)
+    monkeypatch.setattr(configured, 'LMSCOTracker', refuse)
     with pytest.raises(TrackerError, match="'hcs' cannot be built: its weights are missing"):
         build_trackers(['hcs'])
     specs, reasons = buildable_trackers()

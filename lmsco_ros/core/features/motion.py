@@ -70,7 +70,7 @@ class MotionObserver:
             frame, and where nothing moves by itself.
 
         """
-        if self._patch is None or region != self._region:
+        if self._patch is None or not _alike(region, self._region):
             return None
         flow = self._flow(self._patch, patch)
         if self._config.remove_camera_motion:
@@ -79,6 +79,12 @@ class MotionObserver:
         if fastest < self._config.least_motion:
             return None
         return np.stack([flow_image(_zoom(flow, factor)) for factor in factors])
+
+
+def _alike(region: BoundingBox, other: BoundingBox | None) -> bool:
+    """Return whether two regions differ by rounding only, as a region scaled by 1 does."""
+    return other is not None and bool(np.allclose(
+        region.as_tuple(), other.as_tuple(), rtol=0, atol=1e-6 * region.width))
 
 
 def _zoom(flow: np.ndarray, factor: float) -> np.ndarray:

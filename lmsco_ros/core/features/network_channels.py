@@ -58,11 +58,9 @@ class NetworkChannels:
     def __init__(self, network: Backbone, kind: str, requests: Iterable[tuple[str, int]],
                  size: int, backend: Backend) -> None:
         _check_kind(network, kind)
-        self._requests = [(network.layer_name(layer), cell)
-                          for layer, cell in dict.fromkeys(requests)]
-        self._layers = tuple(dict.fromkeys(layer for layer, _ in self._requests))
-        self._names = list(dict.fromkeys(requests))
-        for layer, cell in self._requests:
+        self._requests = {(name, cell): network.layer_name(name) for name, cell in requests}
+        self._layers = tuple(dict.fromkeys(self._requests.values()))
+        for (_, cell), layer in self._requests.items():
             _check_cell(network, layer, cell)
         self._backend = backend
         self._device = torch.device(backend.device)
@@ -93,11 +91,11 @@ class NetworkChannels:
         margin = (self._network.margin,) * 4
         extended = torch.nn.functional.pad(images, margin, mode='replicate')
         maps = dict(zip(self._layers, self._network(extended, self._layers), strict=True))
-        return {name: self._cells(maps[layer], layer, cell)
-                for name, (layer, cell) in zip(self._names, self._requests, strict=True)}
+        return {(name, cell): self._cells(maps[layer], layer, cell)
+                for (name, cell), layer in self._requests.items()}
 
     def _cells(self, maps: torch.Tensor, layer: str, cell: int) -> Array:
-        """Return the middle of a map, averaged over cells, channels last."""
+        """Return what a map shows of the patch itself, averaged over cells, channels last."""
         found = self._network.layers[layer]
         first = found.first_cell(self._network.margin)
         inside = slice(first, first + self._size // cell * cell // found.stride)

@@ -15,8 +15,9 @@
 """
 From a name on the command line to a tracker.
 
-`hcs` (any preset), `csrt` (any of OpenCV's), `nanotrack:backbone.onnx,head.onnx`,
-`vit:net.onnx`, `trax:NAME=command line` and `python:module:callable`.
+`hcs` (any preset), `config:FILE` (any configuration), `csrt` (any of OpenCV's),
+`nanotrack:backbone.onnx,head.onnx`, `vit:net.onnx`, `trax:NAME=command line` and
+`python:module:callable`.
 """
 
 from __future__ import annotations
@@ -25,9 +26,9 @@ from pathlib import Path
 
 from lmsco_ros.core import TrackerConfig
 from lmsco_ros.evaluation.errors import TrackerError
+from lmsco_ros.evaluation.trackers.configured import ConfiguredSpec
 from lmsco_ros.evaluation.trackers.interface import TrackerSpec
 from lmsco_ros.evaluation.trackers.opencv_peer import OPENCV_NAMES, OpenCVSpec
-from lmsco_ros.evaluation.trackers.preset import PresetSpec
 from lmsco_ros.evaluation.trackers.python_peer import PythonSpec
 from lmsco_ros.evaluation.trackers.trax_peer import TraxSpec
 
@@ -51,6 +52,8 @@ def resolve(text: str) -> TrackerSpec:
     ------
     TrackerError
         When no tracker has that name.
+    ConfigError
+        When a configuration cannot be read or holds wrong values.
 
     """
     kind, _, rest = text.partition(':')
@@ -65,7 +68,9 @@ def resolve(text: str) -> TrackerSpec:
             raise TrackerError(f'tracker {kind!r}: there is no model file {missing[0]}')
         return OpenCVSpec(kind, models)
     if text in TrackerConfig.preset_names():
-        return PresetSpec(text)
+        return ConfiguredSpec(text, TrackerConfig.preset(text))
+    if kind == 'config' and rest:
+        return ConfiguredSpec.from_file(Path(rest).expanduser())
     known = ', '.join((*TrackerConfig.preset_names(), *OPENCV_NAMES))
     raise TrackerError(f'there is no tracker {text!r}; known are {known}, '
-                       'trax:NAME=COMMAND and python:MODULE:CALLABLE')
+                       'config:FILE, trax:NAME=COMMAND and python:MODULE:CALLABLE')

@@ -12,12 +12,13 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The trackers of this package: every preset of the configuration."""
+"""The trackers of this package: presets, and configurations in files."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 import json
+from pathlib import Path
 
 import numpy.typing as npt
 
@@ -27,7 +28,7 @@ from lmsco_ros.evaluation.trackers.code_version import core_version
 from lmsco_ros.evaluation.trackers.interface import Answer
 
 
-class PresetTracker:
+class ConfiguredTracker:
     """
     `LMSCOTracker` behind the interface of the evaluation.
 
@@ -59,28 +60,36 @@ class PresetTracker:
 
 
 @dataclass(frozen=True)
-class PresetSpec:
+class ConfiguredSpec:
     """
-    A preset by its name.
+    A configuration and what it is called.
 
     Attributes
     ----------
     name : str
-        One of `TrackerConfig.preset_names()`.
+        Of the preset, or of the file without its suffix.
+    config : TrackerConfig
+        All settings.
 
     """
 
     name: str
+    config: TrackerConfig
+
+    @classmethod
+    def from_file(cls, path: Path) -> ConfiguredSpec:
+        """Return the configuration in a YAML file; raise `ConfigError` where it holds none."""
+        return cls(path.stem, TrackerConfig.from_yaml(path))
 
     @property
     def identity(self) -> str:
-        """All settings of the preset and the version of the core."""
-        settings = TrackerConfig.preset(self.name).to_dict()
-        return f'{core_version()} {json.dumps(settings, sort_keys=True, default=str)}'
+        """All settings and the version of the core."""
+        settings = json.dumps(self.config.to_dict(), sort_keys=True, default=str)
+        return f'{core_version()} {settings}'
 
-    def build(self) -> PresetTracker:
-        """Return a tracker, or raise `TrackerError` saying what the preset lacks here."""
+    def build(self) -> ConfiguredTracker:
+        """Return a tracker, or raise `TrackerError` saying what it lacks here."""
         try:
-            return PresetTracker(TrackerConfig.preset(self.name))
+            return ConfiguredTracker(self.config)
         except LMSCOError as error:
-            raise TrackerError(f'preset {self.name!r} cannot be built: {error}') from error
+            raise TrackerError(f'tracker {self.name!r} cannot be built: {error}') from error
