@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""How sharp a score map is, and what that says about the target."""
+"""How sharp a score map is, and whether a frame shows the target."""
 
 from __future__ import annotations
 
@@ -22,6 +22,7 @@ import math
 import numpy as np
 
 from lmsco_ros.core.config import ConfidenceConfig
+from lmsco_ros.core.trust import trust
 from lmsco_ros.core.types import TrackState
 
 __all__ = ['ConfidenceMonitor', 'Evidence', 'peak_to_sidelobe_ratio']
@@ -64,20 +65,24 @@ class Evidence:
     ----------
     sharpness : float
         Peak-to-sidelobe ratio of the score.
-    presence : float
-        Probability, by comparison with the first frame, that the target is there; 1 where
+    likeness : float
+        What the filter of the first frame says of the peak, as a part of what it says of the
+        target there.
+    presence : float or None
+        Log-odds, by comparison with the first frame, that the target is there; None where
         nothing is compared.
 
     """
 
     sharpness: float
-    presence: float = 1.0
+    likeness: float = 1.0
+    presence: float | None = None
 
 
 @dataclass
 class ConfidenceMonitor:
     """
-    Judges each frame by the sharpness of its scores, against the first frames of the track.
+    Judges each frame by its evidence, against the first frames of the track.
 
     Parameters
     ----------
@@ -96,40 +101,58 @@ class ConfidenceMonitor:
         """State after the last judged frame."""
         return self._state
 
+    @property
+    def learns(self) -> bool:
+        """Whether the last judged frame is one to learn from."""
+        return self._state is TrackState.TRACKING or self.config.learn == 'always'
+
     def quality(self, sharpness: float) -> float:
         """Return the sharpness as a part of the reference; 1 as long as there is none."""
-        if not self._reference:
-            return float(sharpness > 0)
-        return sharpness / float(np.median(self._reference))
+        if not math.isfinite(sharpness) or sharpness <= 0:
+            return 0.0
+        return sharpness / float(np.median(self._reference)) if self._reference else 1.0
+
+    def score(self, evidence: Evidence) -> float:
+        """Return the probability that a frame shows the target, in [0, 1]."""
+        quality = self.quality(evidence.sharpness)
+        return trust(quality, evidence.likeness, evidence.presence) if quality else 0.0
 
     def convincing(self, evidence: Evidence) -> bool:
-        """Return whether a frame shows the target even where it was not expected."""
-        return (self.quality(evidence.sharpness) >= self.config.found
-                and evidence.presence >= self.config.present)
+        """
+        Return whether a frame shows the target even where it was not expected.
+
+        Filter, first filter and comparison must agree, each of them.
+        """
+        return (self.score(evidence) >= self.config.found
+                and self.quality(evidence.sharpness) >= self.config.sharp
+                and evidence.likeness >= self.config.alike
+                and (evidence.presence is None or evidence.presence >= 0))
 
     def believable(self, evidence: Evidence) -> bool:
         """Return whether a frame shows the target."""
+        if self.config.learn == 'always':
+            return True
         if self._state is TrackState.LOST:
             return self.convincing(evidence)
-        return (self.quality(evidence.sharpness) >= self.config.lost
-                and evidence.presence >= self.config.absent)
+        return self.score(evidence) >= self.config.lost
 
     def judge(self, evidence: Evidence) -> TrackState:
         """Take note of a frame and return the state after it."""
-        if self.believable(evidence):
-            self._misses = 0
-            certain = (self.quality(evidence.sharpness) >= self.config.uncertain
-                       and evidence.presence >= self.config.present)
-            self._state = TrackState.TRACKING if certain else TrackState.UNCERTAIN
-            if evidence.sharpness > 0 and len(self._reference) < self.config.reference_frames:
+        score = self.score(evidence)
+        missed = (score < self.config.lost or self._state is TrackState.LOST
+                  and not self.convincing(evidence))
+        self._misses = self._misses + 1 if missed else 0
+        if not missed:
+            self._state = (TrackState.TRACKING if score >= self._certain()
+                           else TrackState.UNCERTAIN)
+            if len(self._reference) < self.config.reference_frames:
                 self._reference.append(evidence.sharpness)
-        else:
-            self._misses += 1
-            lost = self._state is TrackState.LOST or self._misses >= self.config.lost_frames
+        elif self._state is not TrackState.LOST:
+            lost = self._misses >= self.config.lost_frames
             self._state = TrackState.LOST if lost else TrackState.UNCERTAIN
         return self._state
 
-    def score(self, evidence: Evidence) -> float:
-        """Return the trust in a frame, in [0, 1): (1 - exp(-2 quality)) times the presence."""
-        sharp = 1 - math.exp(-2 * max(self.quality(evidence.sharpness), 0.0))
-        return sharp * evidence.presence
+    def _certain(self) -> float:
+        """Return the score from which the state is TRACKING: less for one that already is."""
+        tracking = self._state is TrackState.TRACKING
+        return self.config.uncertain if tracking else self.config.certain

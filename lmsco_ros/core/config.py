@@ -164,12 +164,14 @@ def _presets() -> Mapping[str, TrackerConfig]:
         features=appearance + motion,
         sampling=SamplingConfig(patch_size_min=200, patch_size_max=300),
         networks=NetworkConfig('vgg_m_2048', 'motion_cnn'),
-        scale=ScaleConfig('search', step=1.03, exponent_min=-4, exponent_max=5))
+        scale=ScaleConfig('search', step=1.03, exponent_min=-4, exponent_max=5),
+        confidence=ConfidenceConfig(learn='always', tiles=0, distractors=False))
     unscaled = replace(paper, scale=ScaleConfig('none'))
     return {
         'default': TrackerConfig(
             features=(FeatureConfig((ChannelConfig('appearance', layer='features'),)),),
-            sampling=SamplingConfig(patch_size_min=100, patch_size_max=100)),
+            sampling=SamplingConfig(patch_size_min=100, patch_size_max=100),
+            verification=VerificationConfig('verification')),
         'paper': paper,
         'mas': paper,
         'ma': unscaled,

@@ -17,18 +17,19 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from lmsco_ros.core.backend import Array, Backend
+from lmsco_ros.core.backend import Array, Backend, to_numpy
 from lmsco_ros.core.confidence import peak_to_sidelobe_ratio
 from lmsco_ros.core.config import TrackerConfig
 from lmsco_ros.core.errors import ImageError
 from lmsco_ros.core.features.extractor import FeatureExtractor
 from lmsco_ros.core.features.motion import MotionObserver
-from lmsco_ros.core.fourier.localization import locate, Peak
+from lmsco_ros.core.fourier.localization import locate, Peak, refine
 from lmsco_ros.core.fourier.series import grid_size, shift
+from lmsco_ros.core.learning.memory import score
 from lmsco_ros.core.learning.structured_operator import StructuredOperator
 from lmsco_ros.core.networks import Networks
 from lmsco_ros.core.sampling import FrameView, patch_size, region_around
@@ -50,6 +51,8 @@ class Detection:
         Maximum of the score.
     sample : list of array, shape (2K_l + 1, K_l + 1, C_l)
         Feature series of the region.
+    scores : array, shape (2K + 1, K + 1)
+        Series of the score.
     sharpness : float
         Peak-to-sidelobe ratio of the score.
 
@@ -58,6 +61,7 @@ class Detection:
     region: BoundingBox
     peak: Peak
     sample: list[Array]
+    scores: Array
     sharpness: float
 
     @property
@@ -69,6 +73,11 @@ class Detection:
         """Return the image position (x, y) of a displacement (dy, dx) in periods."""
         x, y = self.region.center
         return x + displacement[1] * self.region.width, y + displacement[0] * self.region.height
+
+    def displacement_to(self, position: tuple[float, float]) -> tuple[float, float]:
+        """Return the displacement (dy, dx) in periods of an image position (x, y)."""
+        x, y = self.region.center
+        return ((position[1] - y) / self.region.height, (position[0] - x) / self.region.width)
 
     def recentered_sample(self) -> list[Array]:
         """Return the sample with the target at the origin."""
@@ -106,6 +115,7 @@ class Detector:
         self._extractor = FeatureExtractor(config, networks, self._patch_size, backend)
         self._motion = MotionObserver(config.motion) if networks.motion is not None else None
         self._operator = self._learn_first(view, box, backend)
+        self._first_filters = [1 * block for block in self._operator.filters]
 
     def __call__(self, view: FrameView, box: BoundingBox,
                  factors: Sequence[float] = (1.0,)) -> Detection:
@@ -132,7 +142,40 @@ class Detector:
         sharpness = peak_to_sidelobe_ratio(
             peak.grid, round(grid / (2 * self._config.sampling.search_factor)))
         return Detection(regions[best], peak, [block[:, :, best, :] for block in samples],
-                         sharpness)
+                         scores[..., best], sharpness)
+
+    def likeness(self, detection: Detection) -> float:
+        """Return what the filter of the first frame, which never changes, says of the peak."""
+        sample = [block[:, :, None, :] for block in detection.sample]
+        series = to_numpy(score(sample, self._first_filters))[..., 0]
+        return refine(series, detection.peak.displacement, 0)[1]
+
+    def near(self, detection: Detection, place: tuple[float, float]) -> Detection:
+        """
+        Return the detection at the highest score within half a target of a place.
+
+        Parameters
+        ----------
+        detection : Detection
+            Another peak of the same score.
+        place : tuple of float
+            Image position (x, y).
+
+        """
+        grid = detection.peak.grid
+        size = grid.shape[0]
+        reach = max(1, round(size / (2 * self._config.sampling.search_factor)))
+        middle = [round(t * size) for t in detection.displacement_to(place)]
+        around = np.arange(-reach, reach + 1)
+        rows, columns = (middle[0] + around) % size, (middle[1] + around) % size
+        square = grid[np.ix_(rows, columns)]
+        row, column = np.unravel_index(np.argmax(square), square.shape)
+        start = tuple((t / size + 0.5) % 1.0 - 0.5 for t in (rows[row], columns[column]))
+        displacement, value = refine(to_numpy(detection.scores), (start[0], start[1]),
+                                     self._config.newton_steps)
+        peak = replace(detection.peak, displacement=displacement, value=value)
+        return replace(detection, peak=peak,
+                       sharpness=detection.sharpness * value / detection.peak.value)
 
     def watch(self, view: FrameView, box: BoundingBox) -> None:
         """Take note of where the target is expected next, to see what moves there."""

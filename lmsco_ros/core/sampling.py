@@ -27,7 +27,8 @@ from lmsco_ros.core.errors import BoxError
 from lmsco_ros.core.intensity import IntensityRange, to_gray
 from lmsco_ros.core.types import BoundingBox
 
-__all__ = ['FrameView', 'check_box', 'clamp_box', 'patch_size', 'region_around', 'search_tiles']
+__all__ = ['FrameView', 'check_box', 'clamp_box', 'patch_size', 'region_around', 'search_tiles',
+           'visible_part']
 
 _SMALLEST_TARGET = 2.0
 _VISIBLE_PART = 0.25
@@ -209,3 +210,12 @@ def clamp_box(box: BoundingBox, image_size: tuple[int, int]) -> BoundingBox:
     shrink = 2 * math.hypot(*image_size) / max(box.size)
     return BoundingBox.from_center((center[0], center[1]), box.size).scaled(
         min(max(1.0, grow), shrink))
+
+
+def visible_part(box: BoundingBox, image_size: tuple[int, int]) -> BoundingBox:
+    """Return the part of a box in the image; its center must not lie outside."""
+    low = max(box.x, 0.0), max(box.y, 0.0)
+    high = (min(box.x + box.width, float(image_size[0])),
+            min(box.y + box.height, float(image_size[1])))
+    inside = low == (box.x, box.y) and high == (box.x + box.width, box.y + box.height)
+    return box if inside else BoundingBox(*low, high[0] - low[0], high[1] - low[1])

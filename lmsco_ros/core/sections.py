@@ -335,41 +335,54 @@ class ConfidenceConfig:
 
     Attributes
     ----------
+    learn : {'tracking', 'always'}
+        Whether the box follows and the filter learns only what is believed, or every frame, as
+        in the paper, whatever the state says.
     reference_frames : int
         Frames after the start whose median sharpness is the measure of all later ones.
-    uncertain, lost : float
-        Sharpness, as a part of the reference, below which the state is UNCERTAIN, and below
-        which the frame is neither believed nor learned from.
+    uncertain, certain : float
+        Score below which TRACKING becomes UNCERTAIN, and from which UNCERTAIN becomes TRACKING
+        again.
+    lost : float
+        Score below which a frame is not believed.
     lost_frames : int
-        Frames in a row below `lost` until the state is LOST.
+        Frames in a row that are not believed until the state is LOST.
     found : float
-        Sharpness, as a part of the reference, from which a LOST target counts as found.
-    absent, present : float
-        Probability of presence below which a frame is not believed, and from which the state is
-        TRACKING or a LOST target counts as found.
+        Score from which a target is found again, or found where it was not expected.
+    sharp, alike : float
+        Sharpness, as a part of the reference, and score of the first frame's filter, as a part
+        of that in the first frame, that a target has to reach for this.
     tiles : int
         Other regions of the image that are searched per frame while the target is missing.
+    distractors : bool
+        Whether other peaks of the score are remembered, so that they do not take the place of
+        a target that vanishes.
 
     """
 
+    learn: str = 'tracking'
     reference_frames: int = 10
-    uncertain: float = 0.3
-    lost: float = 0.15
+    uncertain: float = 0.4
+    certain: float = 0.5
+    lost: float = 0.2
     lost_frames: int = 5
-    found: float = 0.4
-    absent: float = 0.1
-    present: float = 0.5
+    found: float = 0.6
+    sharp: float = 0.3
+    alike: float = 0.2
     tiles: int = 4
+    distractors: bool = True
 
     def __post_init__(self) -> None:
         """Check the ranges."""
+        check_choice(self, 'learn', ('tracking', 'always'))
         check_range(self, 'reference_frames', 1, 1000)
         check_range(self, 'lost', 0, 1)
         check_range(self, 'uncertain', self.lost, 1)
-        check_range(self, 'found', self.lost, 2)
+        check_range(self, 'certain', self.uncertain, 1)
+        check_range(self, 'found', self.lost, 1)
+        check_range(self, 'sharp', 0, 2)
+        check_range(self, 'alike', -1, 2)
         check_range(self, 'lost_frames', 1, 1000)
-        check_range(self, 'absent', 0, 1)
-        check_range(self, 'present', self.absent, 1)
         check_range(self, 'tiles', 0, 64)
 
 

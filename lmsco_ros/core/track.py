@@ -22,10 +22,12 @@ from lmsco_ros.core.backend import Backend
 from lmsco_ros.core.confidence import ConfidenceMonitor, Evidence
 from lmsco_ros.core.config import TrackerConfig
 from lmsco_ros.core.detection import Detection, Detector
+from lmsco_ros.core.distractors import Distractors
 from lmsco_ros.core.fourier.localization import centered_map
 from lmsco_ros.core.intensity import AutomaticGain
 from lmsco_ros.core.networks import Networks
-from lmsco_ros.core.sampling import check_box, clamp_box, FrameView, search_tiles
+from lmsco_ros.core.pursuit import Pursuit
+from lmsco_ros.core.sampling import check_box, clamp_box, FrameView, visible_part
 from lmsco_ros.core.scale import make_scale_estimator
 from lmsco_ros.core.types import BoundingBox, TrackResult, TrackState
 from lmsco_ros.core.verification import Verification
@@ -66,17 +68,21 @@ class Track:
         self._config = config
         self._box = box
         self._frame = 0
-        self._tile = 0
+        self._frozen = 0
         self._gain = AutomaticGain(config.intensity)
         self._monitor = ConfidenceMonitor(config.confidence)
         view = FrameView(image, self._gain.examine(image).intensity)
         self._detector = Detector(config, backend, networks, view, box)
+        self._distractors = Distractors()
+        self._pursuit = Pursuit(config.confidence.tiles)
         self._scale = make_scale_estimator(config.scale, box.size)
         self._scale.learn(view, box)
         self._verification = None if networks.verification is None else Verification(
             networks.verification, view, box)
         first = self._detector(view, box)
         self._first_peak = first.peak.value
+        self._first_likeness = self._detector.likeness(first)
+        self._follow(first, box)
         self._detector.watch(view, box)
         self.result = self._describe(first, 1.0, TrackState.TRACKING)
 
@@ -84,57 +90,79 @@ class Track:
         """Find the target in the next frame, and learn from it if it can be trusted."""
         condition = self._gain.examine(image)
         if condition.frozen:
+            self._frozen += 1
             return self.result
         self._frame += 1
         view = FrameView(image, condition.intensity)
-        detection = self._detector(view, self._box, self._scale.search_factors)
+        expected = self._pursuit.expected(self._box, view.size)
+        detection = self._look(view, expected)
         evidence = self._weigh(view, detection)
-        if not self._monitor.believable(evidence):
-            detection, evidence = self._search_elsewhere(view, detection, evidence)
+        if self._frozen or not self._monitor.believable(evidence):
+            detection, evidence = self._search_elsewhere(view, expected, detection, evidence)
+        self._frozen = 0
         believed = self._monitor.believable(evidence)
         state = self._monitor.judge(evidence)
         if believed:
-            self._follow(view, detection)
+            self._follow(detection, self._resized(view, detection))
+        else:
+            self._pursuit.missed()
+        if self._monitor.learns:
             self._learn(view, detection)
-        self._detector.watch(view, self._box)
+        self._detector.watch(view, self._pursuit.expected(self._box, view.size))
         self.result = self._describe(detection, self._monitor.score(evidence), state)
         return self.result
 
     def _describe(self, detection: Detection, score: float, state: TrackState) -> TrackResult:
         """Return what there is to say; the target in the first frame scores 1 in the map."""
         confidence_map = centered_map(detection.peak.grid / self._first_peak)
-        return TrackResult(self._box, score, state, confidence_map, detection.region)
+        shown = visible_part(self._box, (self.image_shape[1], self.image_shape[0]))
+        return TrackResult(shown, score, state, confidence_map, detection.region)
+
+    def _look(self, view: FrameView, expected: BoundingBox) -> Detection:
+        """Return the best detection that is no distractor."""
+        detection = self._detector(view, expected, self._scale.search_factors)
+        self._distractors.grow_old()
+        if not self._distractors.explains(detection.center, expected):
+            return detection
+        self._distractors.follow(detection.center, expected)
+        return self._detector.near(detection, expected.center)
 
     def _weigh(self, view: FrameView, detection: Detection) -> Evidence:
         """Return what speaks for a detection."""
-        if self._verification is None:
-            return Evidence(detection.sharpness)
-        found = self._verification(view, self._box.moved_to(detection.center))
-        return Evidence(detection.sharpness, found.presence)
+        presence = None if self._verification is None else self._verification(
+            view, self._box.moved_to(detection.center))
+        likeness = self._detector.likeness(detection) / self._first_likeness
+        return Evidence(detection.sharpness, likeness, presence)
 
-    def _search_elsewhere(self, view: FrameView, here: Detection,
+    def _search_elsewhere(self, view: FrameView, expected: BoundingBox, here: Detection,
                           evidence: Evidence) -> tuple[Detection, Evidence]:
-        """Return a convincing detection in the next tiles of the image, or the one here."""
-        tiles = search_tiles(view.size, here.region.width, self._box.center)
-        count = min(self._config.confidence.tiles, len(tiles))
-        chosen = [tiles[(self._tile + i) % len(tiles)] for i in range(count)]
-        self._tile += count
-        if not chosen:
+        """Return a convincing detection in other regions of the image, or the one here."""
+        places = self._pursuit.slice(view.size, here.region.width, expected.center)
+        found = [self._detector(view, expected.moved_to(place)) for place in places]
+        found = [other for other in found
+                 if not self._distractors.explains(other.center, expected)]
+        if not found:
             return here, evidence
-        best = max((self._detector(view, self._box.moved_to(center)) for center in chosen),
-                   key=lambda detection: detection.sharpness)
+        best = max(found, key=lambda detection: detection.sharpness)
         # The window of a tile dims what lies off its center: look again from there.
-        best = self._detector(view, self._box.moved_to(best.center))
-        found = self._weigh(view, best)
-        return (best, found) if self._monitor.convincing(found) else (here, evidence)
+        best = self._detector(view, expected.moved_to(best.center))
+        other = self._weigh(view, best)
+        better = self._monitor.score(other) > self._monitor.score(evidence)
+        return (best, other) if better and self._monitor.convincing(other) else (here, evidence)
 
-    def _follow(self, view: FrameView, detection: Detection) -> None:
-        """Move the box to the detection and adapt its size."""
-        self._tile = 0
+    def _resized(self, view: FrameView, detection: Detection) -> BoundingBox:
+        """Return the box at the detection, in the size of the target there."""
         scale = self._scale.found_factor(detection.peak.scale_values)
         moved = clamp_box(self._box.moved_to(detection.center).scaled(scale), view.size)
-        moved = moved.scaled(self._scale.estimate(view, moved))
-        self._box = clamp_box(moved, view.size)
+        return clamp_box(moved.scaled(self._scale.estimate(view, moved)), view.size)
+
+    def _follow(self, detection: Detection, box: BoundingBox) -> None:
+        """Move to where the target is."""
+        self._box = box
+        self._pursuit.seen(box.center)
+        certain = self._monitor.state is TrackState.TRACKING
+        if certain and self._config.confidence.distractors:
+            self._distractors.learn(detection, box)
 
     def _learn(self, view: FrameView, detection: Detection) -> None:
         """Store the sample; when it is time, train the filter and the scale estimator."""
