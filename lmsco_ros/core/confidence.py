@@ -136,6 +136,10 @@ class ConfidenceMonitor:
             return self.convincing(evidence)
         return self.score(evidence) >= self.config.lost
 
+    def similar(self, evidence: Evidence) -> bool:
+        """Return whether something looks like the target; the target itself may stand beside."""
+        return trust(1.0, evidence.likeness, evidence.presence) >= self.config.lost
+
     def judge(self, evidence: Evidence) -> TrackState:
         """Take note of a frame and return the state after it."""
         score = self.score(evidence)

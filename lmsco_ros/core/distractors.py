@@ -12,66 +12,27 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Places of the image that look like the target and are known not to be it."""
+"""Things in the image that look like the target and are known not to be it."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 import math
 
-import cv2
-import numpy as np
-
-from lmsco_ros.core.detection import Detection
+from lmsco_ros.core.sampling import FrameView
 from lmsco_ros.core.types import BoundingBox
 
-__all__ = ['Distractors', 'other_peaks']
+__all__ = ['Distractors']
 
 _Point = tuple[float, float]
+_Resemblance = Callable[[FrameView, BoundingBox], bool]
 
+# In sides of the target: what counts as a jump, and how far a distractor gets in a frame.
+_JUMP = 1.0
 _SAME_PLACE = 0.75
-_STRENGTH = 0.35
-_MOST_KEPT = 3
 _REMEMBERED_FRAMES = 60
-
-
-def other_peaks(grid: np.ndarray, exclude: int, strength: float) -> list[_Point]:
-    """
-    Return the local maxima of a periodic score beside its maximum, the highest first.
-
-    Parameters
-    ----------
-    grid : ndarray, shape (n, n)
-        Scores; the origin is at [0, 0].
-    exclude : int
-        Half side, in grid points, of the square around the maximum in which none counts.
-    strength : float
-        Part of the maximum that they reach at least.
-
-    Returns
-    -------
-    list of tuple of float
-        Displacements (dy, dx) in periods, in [-1/2, 1/2).
-
-    """
-    size = grid.shape[0]
-    row, column = np.unravel_index(np.argmax(grid), grid.shape)
-    middle = size // 2
-    # With the maximum in the middle, no wanted peak is split by the edge of the square alone.
-    rolled = np.roll(grid, (middle - row, middle - column), axis=(0, 1)).astype(np.float32)
-    framed = cv2.copyMakeBorder(rolled, 1, 1, 1, 1, cv2.BORDER_WRAP)
-    highest = cv2.dilate(framed, np.ones((3, 3), np.uint8))[1:-1, 1:-1]
-    found = (rolled >= highest) & (rolled >= strength * rolled[middle, middle])
-    found[middle - exclude:middle + exclude + 1, middle - exclude:middle + exclude + 1] = False
-    rows, columns = np.nonzero(found)
-    order = np.argsort(-rolled[rows, columns], kind='stable')
-    return [(_wrap((rows[i] - middle + row) / size), _wrap((columns[i] - middle + column) / size))
-            for i in order]
-
-
-def _wrap(t: float) -> float:
-    """Move a position of the period to [-1/2, 1/2)."""
-    return float((t + 0.5) % 1.0 - 0.5)
+_COPIED_BYTES = 1 << 20
 
 
 @dataclass
@@ -84,24 +45,49 @@ class _Place:
 
 class Distractors:
     """
-    Remembers the other strong peaks of frames in which the target was certain.
+    Tells another target from the one that is followed by where it was before.
 
-    When the target vanishes, the score of something similar beside it becomes the highest one.
-    It stands where a peak stood all along, and away from where the target is expected: that
-    tells it from a target that moves. A place that is not confirmed for two seconds is given
-    up, since the target may get there.
+    What is found away from where the target is expected was either not there in the last frame
+    in which the target was certain, and then the target may have jumped; or it was there, while
+    the target was elsewhere. Such a place is followed from then on and forgotten after two
+    seconds, since the target may get there.
+
+    Parameters
+    ----------
+    resembles : callable
+        Returns whether a frame shows something like the target in a box.
+
     """
 
-    def __init__(self) -> None:
+    def __init__(self, resembles: _Resemblance) -> None:
+        self._resembles = resembles
         self._places: list[_Place] = []
+        self._view: FrameView | None = None
+        self._box: BoundingBox | None = None
+        self._age = 0
 
-    def __len__(self) -> int:
-        """Return how many places are known."""
-        return len(self._places)
+    @property
+    def places(self) -> list[_Point]:
+        """Where the known ones were seen last, in image pixels."""
+        return [place.center for place in self._places]
 
-    def explains(self, found: _Point, expected: BoundingBox) -> bool:
+    def certain(self, view: FrameView, box: BoundingBox) -> None:
+        """Keep a frame in which the target is certain; large ones only now and then."""
+        if self._view is None or self._age >= view.image.nbytes / _COPIED_BYTES:
+            self._view, self._box, self._age = view.copied(), box, 0
+
+    def next_frame(self) -> None:
+        """Count a frame, and forget what is too old to say anything."""
+        self._age += 1
+        if self._age > _REMEMBERED_FRAMES:
+            self._view = None
+        for place in self._places:
+            place.age += 1
+        self._places = [place for place in self._places if place.age <= _REMEMBERED_FRAMES]
+
+    def explain(self, found: _Point, expected: BoundingBox) -> bool:
         """
-        Return whether something found is a distractor rather than the target.
+        Return whether something found is a distractor; if so, note its place.
 
         Parameters
         ----------
@@ -111,41 +97,20 @@ class Distractors:
             The target where it is expected.
 
         """
-        return (not _same_place(found, expected.center, expected)
-                and self._nearest(found, expected) is not None)
+        side, jump = expected.area**0.5, math.dist(found, expected.center)
+        near = [place for place in self._places
+                if math.dist(place.center, found) < min(_SAME_PLACE * side, jump)]
+        if near:
+            min(near, key=lambda place: math.dist(place.center, found)).center = found
+            return True
+        if jump < _JUMP * side or not self._was_there(expected.moved_to(found)):
+            return False
+        self._places.append(_Place(found))
+        return True
 
-    def follow(self, found: _Point, box: BoundingBox) -> None:
-        """Move the place that explains something found to where that is now."""
-        place = self._nearest(found, box)
-        if place is not None:
-            place.center = found
-
-    def grow_old(self) -> None:
-        """Count a frame, and forget what was not seen beside the target for long."""
-        for place in self._places:
-            place.age += 1
-        self._places = [p for p in self._places if p.age <= _REMEMBERED_FRAMES]
-
-    def learn(self, detection: Detection, box: BoundingBox) -> None:
-        """Take the other peaks of a frame in which the target is certain."""
-        grid = detection.peak.grid
-        exclude = math.ceil(_SAME_PLACE * grid.shape[0] * box.area**0.5 / detection.region.width)
-        for displacement in other_peaks(grid, exclude, _STRENGTH)[:_MOST_KEPT]:
-            center = detection.image_position(displacement)
-            place = self._nearest(center, box)
-            if place is None:
-                self._places.append(_Place(center))
-            else:
-                place.center, place.age = center, 0
-        self._places = [p for p in self._places if not _same_place(p.center, box.center, box)]
-        self._places = sorted(self._places, key=lambda p: p.age)[:2 * _MOST_KEPT]
-
-    def _nearest(self, center: _Point, box: BoundingBox) -> _Place | None:
-        """Return the known place that a point belongs to."""
-        near = [p for p in self._places if _same_place(p.center, center, box)]
-        return min(near, key=lambda p: math.dist(p.center, center)) if near else None
-
-
-def _same_place(one: _Point, other: _Point, box: BoundingBox) -> bool:
-    """Return whether two points are less than three quarters of a target apart."""
-    return math.dist(one, other) < _SAME_PLACE * box.area**0.5
+    def _was_there(self, box: BoundingBox) -> bool:
+        """Return whether the kept frame shows the like, while the target was elsewhere."""
+        if self._view is None or self._box is None:
+            return False
+        apart = math.dist(box.center, self._box.center) >= _JUMP * box.area**0.5
+        return apart and self._resembles(self._view, box)

@@ -56,6 +56,10 @@ class FrameView:
         """Width and height in pixels."""
         return self.image.shape[1], self.image.shape[0]
 
+    def copied(self) -> FrameView:
+        """Return a view that does not change when the caller's image does."""
+        return FrameView(self.image.copy(), self.intensity)
+
     def patch(self, region: BoundingBox, size: tuple[int, int]) -> np.ndarray:
         """
         Resample a region of the frame.

@@ -73,7 +73,7 @@ class Track:
         self._monitor = ConfidenceMonitor(config.confidence)
         view = FrameView(image, self._gain.examine(image).intensity)
         self._detector = Detector(config, backend, networks, view, box)
-        self._distractors = Distractors()
+        self._distractors = Distractors(self._resembles)
         self._pursuit = Pursuit(config.confidence.tiles)
         self._scale = make_scale_estimator(config.scale, box.size)
         self._scale.learn(view, box)
@@ -82,7 +82,7 @@ class Track:
         first = self._detector(view, box)
         self._first_peak = first.peak.value
         self._first_likeness = self._detector.likeness(first)
-        self._follow(first, box)
+        self._follow(view, box)
         self._detector.watch(view, box)
         self.result = self._describe(first, 1.0, TrackState.TRACKING)
 
@@ -103,7 +103,7 @@ class Track:
         believed = self._monitor.believable(evidence)
         state = self._monitor.judge(evidence)
         if believed:
-            self._follow(detection, self._resized(view, detection))
+            self._follow(view, self._resized(view, detection))
         else:
             self._pursuit.missed()
         if self._monitor.learns:
@@ -119,13 +119,17 @@ class Track:
         return TrackResult(shown, score, state, confidence_map, detection.region)
 
     def _look(self, view: FrameView, expected: BoundingBox) -> Detection:
-        """Return the best detection that is no distractor."""
+        """Return the best detection, or where the target is expected if that is a distractor."""
+        self._distractors.next_frame()
         detection = self._detector(view, expected, self._scale.search_factors)
-        self._distractors.grow_old()
-        if not self._distractors.explains(detection.center, expected):
-            return detection
-        self._distractors.follow(detection.center, expected)
-        return self._detector.near(detection, expected.center)
+        if self._distractors.explain(detection.center, expected):
+            return self._detector.near(detection, expected.center)
+        return detection
+
+    def _resembles(self, view: FrameView, box: BoundingBox) -> bool:
+        """Return whether a frame shows something like the target in a box."""
+        seen = self._detector.near(self._detector(view, box), box.center)
+        return self._monitor.similar(self._weigh(view, seen))
 
     def _weigh(self, view: FrameView, detection: Detection) -> Evidence:
         """Return what speaks for a detection."""
@@ -137,18 +141,21 @@ class Track:
     def _search_elsewhere(self, view: FrameView, expected: BoundingBox, here: Detection,
                           evidence: Evidence) -> tuple[Detection, Evidence]:
         """Return a convincing detection in other regions of the image, or the one here."""
+        # A distractor has to be watched, or it gets away from its place and looks new.
+        for place in self._distractors.places:
+            self._distractors.explain(
+                self._detector(view, expected.moved_to(place)).center, expected)
         places = self._pursuit.slice(view.size, here.region.width, expected.center)
         found = [self._detector(view, expected.moved_to(place)) for place in places]
-        found = [other for other in found
-                 if not self._distractors.explains(other.center, expected)]
-        if not found:
-            return here, evidence
-        best = max(found, key=lambda detection: detection.sharpness)
-        # The window of a tile dims what lies off its center: look again from there.
-        best = self._detector(view, expected.moved_to(best.center))
-        other = self._weigh(view, best)
-        better = self._monitor.score(other) > self._monitor.score(evidence)
-        return (best, other) if better and self._monitor.convincing(other) else (here, evidence)
+        for other in sorted(found, key=lambda detection: -detection.sharpness)[:2]:
+            # The window of a tile dims what lies off its center: look again from there.
+            best = self._detector(view, expected.moved_to(other.center))
+            seen = self._weigh(view, best)
+            better = self._monitor.score(seen) > self._monitor.score(evidence)
+            if (better and self._monitor.convincing(seen)
+                    and not self._distractors.explain(best.center, expected)):
+                return best, seen
+        return here, evidence
 
     def _resized(self, view: FrameView, detection: Detection) -> BoundingBox:
         """Return the box at the detection, in the size of the target there."""
@@ -156,13 +163,13 @@ class Track:
         moved = clamp_box(self._box.moved_to(detection.center).scaled(scale), view.size)
         return clamp_box(moved.scaled(self._scale.estimate(view, moved)), view.size)
 
-    def _follow(self, detection: Detection, box: BoundingBox) -> None:
+    def _follow(self, view: FrameView, box: BoundingBox) -> None:
         """Move to where the target is."""
         self._box = box
         self._pursuit.seen(box.center)
         certain = self._monitor.state is TrackState.TRACKING
         if certain and self._config.confidence.distractors:
-            self._distractors.learn(detection, box)
+            self._distractors.certain(view, box)
 
     def _learn(self, view: FrameView, detection: Detection) -> None:
         """Store the sample; when it is time, train the filter and the scale estimator."""

@@ -57,7 +57,7 @@ class TrustModel:
     constant: float
 
 
-VERIFIED = TrustModel(quality=1.33, likeness=1.78, presence=0.86, constant=-2.34)
+VERIFIED = TrustModel(quality=1.47, likeness=1.07, presence=0.84, constant=-2.30)
 UNVERIFIED = TrustModel(quality=1.11, likeness=4.05, presence=0.0, constant=-2.66)
 
 
