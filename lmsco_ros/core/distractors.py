@@ -47,7 +47,7 @@ class Distractors:
     """
     Tells another target from the one that is followed by where it was before.
 
-    What is found away from where the target is expected was either not there in the last frame
+    What is found away from where the target was seen last was either not there in the last frame
     in which the target was certain, and then the target may have jumped; or it was there, while
     the target was elsewhere. Such a place is followed from then on and forgotten after two
     seconds, since the target may get there.
@@ -85,7 +85,7 @@ class Distractors:
             place.age += 1
         self._places = [place for place in self._places if place.age <= _REMEMBERED_FRAMES]
 
-    def explain(self, found: _Point, expected: BoundingBox) -> bool:
+    def explain(self, found: _Point, last: BoundingBox) -> bool:
         """
         Return whether something found is a distractor; if so, note its place.
 
@@ -93,17 +93,17 @@ class Distractors:
         ----------
         found : tuple of float
             Image position (x, y).
-        expected : BoundingBox
-            The target where it is expected.
+        last : BoundingBox
+            The target where it was seen last.
 
         """
-        side, jump = expected.area**0.5, math.dist(found, expected.center)
+        side, jump = last.area**0.5, math.dist(found, last.center)
         near = [place for place in self._places
                 if math.dist(place.center, found) < min(_SAME_PLACE * side, jump)]
         if near:
             min(near, key=lambda place: math.dist(place.center, found)).center = found
             return True
-        if jump < _JUMP * side or not self._was_there(expected.moved_to(found)):
+        if jump < _JUMP * side or not self._was_there(last.moved_to(found)):
             return False
         self._places.append(_Place(found))
         return True

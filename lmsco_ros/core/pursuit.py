@@ -24,7 +24,7 @@ __all__ = ['Pursuit']
 _Point = tuple[float, float]
 
 _SMOOTHING = 0.3
-_DAMPING = 0.85
+_DAMPING = 0.7
 
 
 class Pursuit:
@@ -32,7 +32,7 @@ class Pursuit:
     Predicts where a target is that is not seen, and in which order the image is searched.
 
     The target goes on with its mean velocity of the last frames, which fades, so that the
-    prediction comes to rest after about seven frames' way. The search spreads from there over
+    prediction comes to rest after about three frames' way. The search spreads from there over
     the whole image, a slice of it in every frame, and starts over.
 
     Parameters

@@ -122,7 +122,7 @@ class Track:
         """Return the best detection, or where the target is expected if that is a distractor."""
         self._distractors.next_frame()
         detection = self._detector(view, expected, self._scale.search_factors)
-        if self._distractors.explain(detection.center, expected):
+        if self._distractors.explain(detection.center, self._box):
             return self._detector.near(detection, expected.center)
         return detection
 
@@ -144,7 +144,7 @@ class Track:
         # A distractor has to be watched, or it gets away from its place and looks new.
         for place in self._distractors.places:
             self._distractors.explain(
-                self._detector(view, expected.moved_to(place)).center, expected)
+                self._detector(view, expected.moved_to(place)).center, self._box)
         places = self._pursuit.slice(view.size, here.region.width, expected.center)
         found = [self._detector(view, expected.moved_to(place)) for place in places]
         for other in sorted(found, key=lambda detection: -detection.sharpness)[:2]:
@@ -153,7 +153,7 @@ class Track:
             seen = self._weigh(view, best)
             better = self._monitor.score(seen) > self._monitor.score(evidence)
             if (better and self._monitor.convincing(seen)
-                    and not self._distractors.explain(best.center, expected)):
+                    and not self._distractors.explain(best.center, self._box)):
                 return best, seen
         return here, evidence
 
