@@ -27,6 +27,8 @@ from lmsco_ros.core.types import TrackState
 
 __all__ = ['ConfidenceMonitor', 'Evidence', 'peak_to_sidelobe_ratio']
 
+_JUMP = 1.0
+
 
 def peak_to_sidelobe_ratio(grid: np.ndarray, exclude: int) -> float:
     """
@@ -71,12 +73,15 @@ class Evidence:
     presence : float or None
         Log-odds, by comparison with the first frame, that the target is there; None where
         nothing is compared.
+    jump : float
+        Distance, in sides of the target, from where it was expected.
 
     """
 
     sharpness: float
     likeness: float = 1.0
     presence: float | None = None
+    jump: float = 0.0
 
 
 @dataclass
@@ -92,7 +97,8 @@ class ConfidenceMonitor:
     """
 
     config: ConfidenceConfig
-    _reference: list[float] = field(default_factory=list)
+    _first: list[float] = field(default_factory=list)
+    _reference: float | None = None
     _state: TrackState = TrackState.TRACKING
     _misses: int = 0
 
@@ -110,7 +116,7 @@ class ConfidenceMonitor:
         """Return the sharpness as a part of the reference; 1 as long as there is none."""
         if not math.isfinite(sharpness) or sharpness <= 0:
             return 0.0
-        return sharpness / float(np.median(self._reference)) if self._reference else 1.0
+        return sharpness / self._reference if self._reference else 1.0
 
     def score(self, evidence: Evidence) -> float:
         """Return the probability that a frame shows the target, in [0, 1]."""
@@ -132,9 +138,7 @@ class ConfidenceMonitor:
         """Return whether a frame shows the target."""
         if self.config.learn == 'always':
             return True
-        if self._state is TrackState.LOST:
-            return self.convincing(evidence)
-        return self.score(evidence) >= self.config.lost
+        return not self._misses_target(evidence)
 
     def similar(self, evidence: Evidence) -> bool:
         """Return whether something looks like the target; the target itself may stand beside."""
@@ -143,18 +147,29 @@ class ConfidenceMonitor:
     def judge(self, evidence: Evidence) -> TrackState:
         """Take note of a frame and return the state after it."""
         score = self.score(evidence)
-        missed = (score < self.config.lost or self._state is TrackState.LOST
-                  and not self.convincing(evidence))
+        missed = self._misses_target(evidence)
         self._misses = self._misses + 1 if missed else 0
         if not missed:
             self._state = (TrackState.TRACKING if score >= self._certain()
                            else TrackState.UNCERTAIN)
-            if len(self._reference) < self.config.reference_frames:
-                self._reference.append(evidence.sharpness)
+            self._set_reference(evidence.sharpness)
         elif self._state is not TrackState.LOST:
             lost = self._misses >= self.config.lost_frames
             self._state = TrackState.LOST if lost else TrackState.UNCERTAIN
         return self._state
+
+    def _misses_target(self, evidence: Evidence) -> bool:
+        """Return whether a frame does not show the target, as far as one can tell."""
+        if self._state is TrackState.LOST:
+            return not self.convincing(evidence)
+        jumped = evidence.jump > _JUMP
+        return self.score(evidence) < (self.config.uncertain if jumped else self.config.lost)
+
+    def _set_reference(self, sharpness: float) -> None:
+        """Take a frame into the reference, if it is one of the first that show something."""
+        if sharpness > 0 and len(self._first) < self.config.reference_frames:
+            self._first.append(sharpness)
+            self._reference = float(np.median(self._first))
 
     def _certain(self) -> float:
         """Return the score from which the state is TRACKING: less for one that already is."""

@@ -344,7 +344,8 @@ class ConfidenceConfig:
         Score below which TRACKING becomes UNCERTAIN, and from which UNCERTAIN becomes TRACKING
         again.
     lost : float
-        Score below which a frame is not believed.
+        Score below which a frame is not believed; after a jump by more than the target's side,
+        `uncertain` is.
     lost_frames : int
         Frames in a row that are not believed until the state is LOST.
     found : float
@@ -362,13 +363,13 @@ class ConfidenceConfig:
 
     learn: str = 'tracking'
     reference_frames: int = 10
-    uncertain: float = 0.4
-    certain: float = 0.5
-    lost: float = 0.2
+    uncertain: float = 0.5
+    certain: float = 0.6
+    lost: float = 0.1
     lost_frames: int = 5
-    found: float = 0.6
-    sharp: float = 0.3
-    alike: float = 0.2
+    found: float = 0.8
+    sharp: float = 0.4
+    alike: float = 0.3
     tiles: int = 4
     distractors: bool = True
 

@@ -16,6 +16,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from lmsco_ros.core.backend import Backend
@@ -96,7 +98,7 @@ class Track:
         view = FrameView(image, condition.intensity)
         expected = self._pursuit.expected(self._box, view.size)
         detection = self._look(view, expected)
-        evidence = self._weigh(view, detection)
+        evidence = self._weigh(view, detection, expected)
         if self._frozen or not self._monitor.believable(evidence):
             detection, evidence = self._search_elsewhere(view, expected, detection, evidence)
         self._frozen = 0
@@ -129,14 +131,15 @@ class Track:
     def _resembles(self, view: FrameView, box: BoundingBox) -> bool:
         """Return whether a frame shows something like the target in a box."""
         seen = self._detector.near(self._detector(view, box), box.center)
-        return self._monitor.similar(self._weigh(view, seen))
+        return self._monitor.similar(self._weigh(view, seen, box))
 
-    def _weigh(self, view: FrameView, detection: Detection) -> Evidence:
+    def _weigh(self, view: FrameView, detection: Detection, expected: BoundingBox) -> Evidence:
         """Return what speaks for a detection."""
         presence = None if self._verification is None else self._verification(
             view, self._box.moved_to(detection.center))
         likeness = self._detector.likeness(detection) / self._first_likeness
-        return Evidence(detection.sharpness, likeness, presence)
+        jump = math.dist(detection.center, expected.center) / expected.area**0.5
+        return Evidence(detection.sharpness, likeness, presence, jump)
 
     def _search_elsewhere(self, view: FrameView, expected: BoundingBox, here: Detection,
                           evidence: Evidence) -> tuple[Detection, Evidence]:
@@ -150,7 +153,7 @@ class Track:
         for other in sorted(found, key=lambda detection: -detection.sharpness)[:2]:
             # The window of a tile dims what lies off its center: look again from there.
             best = self._detector(view, expected.moved_to(other.center))
-            seen = self._weigh(view, best)
+            seen = self._weigh(view, best, expected)
             better = self._monitor.score(seen) > self._monitor.score(evidence)
             if (better and self._monitor.convincing(seen)
                     and not self._distractors.explain(best.center, self._box)):
