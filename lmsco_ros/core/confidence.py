@@ -142,7 +142,8 @@ class ConfidenceMonitor:
 
     def similar(self, evidence: Evidence) -> bool:
         """Return whether something looks like the target; the target itself may stand beside."""
-        return trust(1.0, evidence.likeness, evidence.presence) >= self.config.lost
+        return (trust(1.0, evidence.likeness, evidence.presence) >= self.config.uncertain
+                and evidence.likeness >= self.config.alike)
 
     def judge(self, evidence: Evidence) -> TrackState:
         """Take note of a frame and return the state after it."""

@@ -25,6 +25,7 @@ import numpy as np
 from lmsco_ros.core.config import SamplingConfig
 from lmsco_ros.core.errors import BoxError
 from lmsco_ros.core.intensity import IntensityRange, to_gray
+from lmsco_ros.core.probe import without_dead_pixels
 from lmsco_ros.core.types import BoundingBox
 
 __all__ = ['FrameView', 'check_box', 'clamp_box', 'patch_size', 'region_around', 'search_tiles',
@@ -75,14 +76,15 @@ class FrameView:
         -------
         ndarray, shape (height, width), float32
             Intensities in the working range. A region with more pixels than the patch is
-            averaged, not skipped through.
+            averaged, not skipped through. Dead pixels are filled in first.
 
         """
         step = (region.width / size[0], region.height / size[1])
         factor = (max(1, int(step[0])), max(1, int(step[1])))
         x0, x1 = _covering_span(region.x, region.width, self.size[0], factor[0])
         y0, y1 = _covering_span(region.y, region.height, self.size[1], factor[1])
-        pixels = to_gray(self.image[y0:y1, x0:x1])
+        pixels = without_dead_pixels(to_gray(self.image[y0:y1, x0:x1]),
+                                     abs(self.intensity.high - self.intensity.low))
         if factor != (1, 1):
             pixels = _average(pixels, factor)
         values = self.intensity.normalize(pixels.astype(np.float32, copy=False))

@@ -24,12 +24,13 @@ from lmsco_ros.core.config import SamplingConfig
 from lmsco_ros.core.errors import BoxError
 from lmsco_ros.core.intensity import IntensityRange
 from lmsco_ros.core.sampling import (
-    check_box, clamp_box, FrameView, patch_size, region_around, search_tiles)
+    check_box, clamp_box, FrameView, patch_size, region_around, search_tiles, visible_part)
 from lmsco_ros.core.types import BoundingBox
 
 
 WIDTH, HEIGHT = 64, 48
 COUNTS = IntensityRange(0, 1)
+DEEP = IntensityRange(0, 2**16)
 # The bilinear interpolation rounds positions to 1/32 of a pixel.
 POSITION = 1 / 32
 
@@ -65,14 +66,15 @@ def test_positions_on_a_ramp(x, y, width, height, columns, rows):
 
 def test_one_to_one_region_is_the_image_itself(rng):
     image = rng.integers(0, 2**16, (HEIGHT, WIDTH)).astype(np.uint16)
-    patch = FrameView(image, COUNTS).patch(BoundingBox(10, 5, 20, 30), (20, 30))
-    np.testing.assert_array_equal(patch, image[5:35, 10:30])
+    patch = FrameView(image, DEEP).patch(BoundingBox(10, 5, 20, 30), (20, 30))
+    np.testing.assert_array_equal(patch, image[5:35, 10:30] / np.float32(2**16))
 
 
 @given(x=st.floats(-60, 80), y=st.floats(-60, 60), side=st.floats(4, 60))
 def test_border_pixels_go_on_outside(x, y, side):
     region = BoundingBox(x, y, side, side)
-    patch = ramp_view().patch(region, (61, 61))
+    # In a range so wide that no corner of the ramp counts as a dead pixel.
+    patch = 2**16 * FrameView(ramp_view().image, DEEP).patch(region, (61, 61))
     px, py = points(region, (61, 61))
     expected = ramp(np.clip(px, 0.5, WIDTH - 0.5), np.clip(py, 0.5, HEIGHT - 0.5))
     np.testing.assert_allclose(patch, expected, atol=5 * POSITION)
@@ -90,7 +92,7 @@ def test_region_without_a_pixel_shows_the_nearest_corner(corner, row, column, si
 @pytest.mark.parametrize('factor', [2, 3, 5])
 @pytest.mark.parametrize('offset', [20, 21, 23])
 def test_shrinking_averages_all_pixels(rng, factor, offset):
-    image = rng.normal(size=(90, 100)).astype(np.float32)
+    image = rng.random((90, 100), np.float32)
     side = 6 * factor
     patch = FrameView(image, COUNTS).patch(BoundingBox(offset, offset + 2, side, side), (6, 6))
     pixels = image[offset + 2:offset + 2 + side, offset:offset + side]
@@ -226,3 +228,20 @@ def test_clamped_boxes_can_be_tracked(box):
 def test_good_boxes_stay_as_they_are(x, y, w, h):
     box = BoundingBox(x, y, w, h)
     assert clamp_box(box, (200, 100)).as_tuple() == pytest.approx(box.as_tuple(), abs=1e-9)
+
+
+@pytest.mark.parametrize('size', [(30, 30), (10, 10)])
+def test_dead_pixels_leave_no_trace(rng, size):
+    image = (100 + rng.normal(size=(90, 100))).astype(np.float32)
+    broken = image.copy()
+    broken[20, 25], broken[31, 40], broken[:, 33] = 5000, -5000, 9000
+    region, counts = BoundingBox(15, 10, 30, 30), IntensityRange(50, 150)
+    clean = FrameView(image, counts).patch(region, size)
+    repaired = FrameView(broken, counts).patch(region, size)
+    assert np.abs(repaired - clean).max() < 0.1
+
+
+def test_box_over_the_border_is_shown_up_to_it():
+    inside = BoundingBox(3.1, 4.2, 5.3, 6.4)
+    assert visible_part(inside, (40, 30)) is inside
+    assert visible_part(BoundingBox(-4, 25, 10, 10), (40, 30)) == BoundingBox(0, 25, 6, 5)

@@ -1,0 +1,170 @@
+# Copyright 2026 lmsco_ros contributors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Memory of things that look like the target, and where a missing one is looked for."""
+
+import numpy as np
+import pytest
+
+from lmsco_ros.core import BoundingBox
+from lmsco_ros.core.distractors import Distractors
+from lmsco_ros.core.intensity import IntensityRange
+from lmsco_ros.core.pursuit import Pursuit
+from lmsco_ros.core.sampling import FrameView
+
+SIZE = (320, 240)
+BOX = BoundingBox.from_center((100, 100), (20, 20))
+TWIN = (150.0, 110.0)
+
+
+class Scenery:
+    """Frames in which each lit pixel looks like a target within 5 pixels."""
+
+    def __init__(self):
+        self.asked = 0
+
+    def view(self, *places):
+        image = np.zeros(SIZE[::-1], np.uint8)
+        for x, y in places:
+            image[int(y), int(x)] = 1
+        return FrameView(image, IntensityRange(0, 1))
+
+    def resembles(self, view, box):
+        self.asked += 1
+        rows, columns = np.nonzero(view.image)
+        return bool((np.hypot(columns - box.center[0], rows - box.center[1]) < 5).any())
+
+
+@pytest.fixture
+def scenery():
+    return Scenery()
+
+
+@pytest.fixture
+def distractors(scenery):
+    """Return a memory that has seen a target, with something like it beside."""
+    result = Distractors(scenery.resembles)
+    result.certain(scenery.view(BOX.center, TWIN), BOX)
+    result.next_frame()
+    return result
+
+
+def test_what_was_there_before_is_a_distractor(distractors):
+    assert distractors.explain(TWIN, BOX)
+    assert distractors.places == [TWIN]
+
+
+def test_what_was_not_there_may_be_the_target(distractors):
+    assert not distractors.explain((40.0, 180.0), BOX)
+    assert distractors.places == []
+
+
+def test_target_that_moves_is_not_asked_about(distractors, scenery):
+    for place in ((100.0, 100.0), (115.0, 105.0)):
+        assert not distractors.explain(place, BOX)
+    assert scenery.asked == 0
+
+
+def test_frame_without_a_certain_target_says_nothing(scenery):
+    assert not Distractors(scenery.resembles).explain(TWIN, BOX)
+
+
+def test_distractor_is_followed_and_does_not_spread(distractors):
+    distractors.explain(TWIN, BOX)
+    place = TWIN
+    for _ in range(8):
+        place = (place[0] + 6, place[1] - 5)
+        assert distractors.explain(place, BOX)
+    assert distractors.places == [place]
+    # Where it was at first, a target may be by now; it is not at the known place any more.
+    assert not distractors.explain((60.0, 60.0), BOX)
+
+
+def test_known_distractor_wins_near_the_target(distractors):
+    distractors.explain(TWIN, BOX)
+    beside = BOX.moved_to((134.0, 110.0))
+    assert distractors.explain((148.0, 110.0), beside)
+    assert not distractors.explain((137.0, 110.0), beside)
+
+
+def test_distractor_is_forgotten_after_two_seconds(distractors):
+    distractors.explain(TWIN, BOX)
+    for _ in range(60):
+        assert distractors.explain(TWIN, BOX)
+        distractors.next_frame()
+    distractors.next_frame()
+    assert distractors.places == [] and not distractors.explain(TWIN, BOX)
+
+
+def test_kept_frame_is_a_copy(scenery):
+    view, distractors = scenery.view(BOX.center, TWIN), Distractors(scenery.resembles)
+    distractors.certain(view, BOX)
+    view.image[:] = 0
+    assert distractors.explain(TWIN, BOX)
+
+
+def walk(pursuit, step, count):
+    """Let a target walk and return its last box."""
+    for n in range(count):
+        box = BOX.moved_to((100 + n * step[0], 100 + n * step[1]))
+        pursuit.seen(box.center)
+    return box
+
+
+def test_seen_target_is_expected_where_it_is():
+    pursuit = Pursuit(4)
+    box = walk(pursuit, (3, -1), 20)
+    assert pursuit.expected(box, SIZE) == box
+
+
+def test_missed_target_goes_on_and_comes_to_rest():
+    pursuit = Pursuit(4)
+    box = walk(pursuit, (3, -1), 20)
+    ways = []
+    for _ in range(40):
+        pursuit.missed()
+        ways.append(pursuit.expected(box, SIZE).center[0] - box.center[0])
+    assert ways[0] == pytest.approx(3, rel=0.01)
+    assert np.all(np.diff(ways) >= 0) and np.diff(ways)[-1] < 1e-3
+    assert ways[-1] == pytest.approx(3 / 0.3, rel=0.01)
+
+
+def test_expected_center_stays_in_the_image():
+    pursuit = Pursuit(4)
+    box = walk(pursuit, (20, 0), 11)
+    for _ in range(10):
+        pursuit.missed()
+        assert pursuit.expected(box, SIZE).center[0] <= SIZE[0]
+
+
+@pytest.mark.parametrize('tiles', [1, 3, 500])
+def test_slices_cover_the_image_from_the_inside_out_and_start_over(tiles):
+    pursuit = Pursuit(tiles)
+    seen = [place for _ in range(60 // min(tiles, 60) + 1)
+            for place in pursuit.slice(SIZE, 80, (200, 50))]
+    count = 8 * 6
+    distances = [np.hypot(x - 200, y - 50) for x, y in seen[:count]]
+    assert len(set(seen)) == count and distances == sorted(distances)
+    assert seen[count:] == seen[:len(seen) - count]
+    xs, ys = np.array(seen[:count]).T
+    assert min(xs) <= 40 and max(xs) >= 280 and min(ys) <= 40 and max(ys) >= 200
+
+
+def test_search_starts_anew_after_the_target_was_seen():
+    pursuit = Pursuit(4)
+    first = pursuit.slice(SIZE, 80, (200, 50))
+    assert pursuit.slice(SIZE, 80, (200, 50)) != first
+    pursuit.seen((200, 50))
+    assert pursuit.slice(SIZE, 80, (200, 50)) == first
+    assert Pursuit(0).slice(SIZE, 80, (200, 50)) == []

@@ -1,0 +1,189 @@
+# Copyright 2026 lmsco_ros contributors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Fit the coefficients of `lmsco_ros.core.trust`.
+
+    python -m training.trust --data DATA [--frames N]
+
+DATA holds `thermal_dev`. Every 5th clip of the train part, which the verification network never
+saw, is tracked as it is and under the challenges that take the target away, move it, or set
+another one beside it. Printed are the coefficients, and for each challenge the chance that a
+detection on the target is trusted more than one off it.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+from scipy.optimize import minimize
+import yaml
+
+from lmsco_ros.core import BoundingBox, LMSCOError, TrackerConfig
+from lmsco_ros.core.backend import limit_threads, select_backend
+from lmsco_ros.core.confidence import Evidence
+from lmsco_ros.core.detection import Detection
+from lmsco_ros.core.networks import load_networks
+from lmsco_ros.core.sampling import FrameView
+from lmsco_ros.core.track import Track
+from lmsco_ros.core.trust import regressors
+from lmsco_ros.evaluation.challenges import apply_challenge
+from lmsco_ros.evaluation.datasets import scan_dataset, TrackingSequence
+from lmsco_ros.evaluation.errors import SequenceError
+from lmsco_ros.evaluation.geometry import is_absent
+from lmsco_ros.evaluation.protocols.confidence import auroc, auroc_terms
+from lmsco_ros.evaluation.split import load_split
+from training.train import CONFIG
+
+CHALLENGES = ('', 'disappear_1s', 'disappear_3s', 'leave', 'cut', 'twin', 'twin_remains',
+              'shutter')
+PRESENT_SHARE = 0.9
+
+Array = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Records:
+    """
+    What was seen in the frames of one sequence.
+
+    Attributes
+    ----------
+    hints : ndarray, shape (n, 3)
+        What the coefficients multiply: sharpness, likeness, presence.
+    overlap : ndarray, shape (n,)
+        Of the detection with the target; 0 where that is absent.
+
+    """
+
+    hints: Array
+    overlap: Array
+
+
+class RecordingTrack(Track):
+    """A track that keeps the evidence of what it sees first in each frame, and where that is."""
+
+    seen: tuple[Evidence, BoundingBox] | None = None
+
+    def _weigh(self, view: FrameView, detection: Detection, expected: BoundingBox) -> Evidence:
+        """Return and keep what speaks for a detection."""
+        evidence = super()._weigh(view, detection, expected)
+        if self.seen is None:
+            self.seen = evidence, self._box.moved_to(detection.center)
+        return evidence
+
+    def hints(self, evidence: Evidence) -> tuple[float, float, float]:
+        """Return what the coefficients multiply."""
+        quality = self._monitor.quality(evidence.sharpness)
+        return regressors(quality, evidence.likeness, evidence.presence or 0.0)
+
+
+def main() -> None:
+    """Track, fit and print."""
+    parser = argparse.ArgumentParser(description=__doc__.split('\n\n')[0])
+    parser.add_argument('--data', type=Path, required=True)
+    parser.add_argument('--frames', type=int, default=150)
+    options = parser.parse_args()
+    limit_threads(1)
+    every = yaml.safe_load(CONFIG.read_text(encoding='utf-8'))['validation']['every']
+    known = scan_dataset(options.data / 'thermal_dev').sequences
+    sequences = [sequence.first(min(options.frames, len(sequence)))
+                 for sequence in load_split().select('train', known)[::every]]
+    records = {name: list(record_all(sequences, name)) for name in CHALLENGES}
+    everything = [part for parts in records.values() for part in parts]
+    for label, columns in (('VERIFIED', [0, 1, 2]), ('UNVERIFIED', [0, 1])):
+        weights = fit(everything, columns)
+        print(label, ' '.join(f'{value:.2f}' for value in weights))
+        for name, parts in records.items():
+            print(f'    {name or "plain":<14}{separation(parts, columns, weights):.3f}')
+
+
+def record_all(sequences: Sequence[TrackingSequence], challenge: str) -> Iterator[Records]:
+    """Yield the records of all sequences that fit a challenge."""
+    config = TrackerConfig.preset('default')
+    for sequence in sequences:
+        try:
+            changed = apply_challenge(sequence, challenge) if challenge else sequence
+        except SequenceError:
+            continue
+        yield record(changed, config)
+
+
+def record(sequence: TrackingSequence, config: TrackerConfig) -> Records:
+    """Track a sequence and return what was seen."""
+    truth = sequence.ground_truth
+    absent = is_absent(truth)
+    track: RecordingTrack | None = None
+    hints, overlaps = [], []
+    for frame in range(len(sequence)):
+        image = sequence.frames[frame]
+        if track is None:
+            track = None if absent[frame] else _start(config, image, BoundingBox(*truth[frame]))
+            continue
+        track.seen = None
+        track.advance(image)
+        if track.seen is not None:
+            evidence, box = track.seen
+            hints.append(track.hints(evidence))
+            overlaps.append(0.0 if absent[frame] else box.overlap(BoundingBox(*truth[frame])))
+    return Records(np.array(hints).reshape(-1, 3), np.array(overlaps))
+
+
+def _start(config: TrackerConfig, image: npt.NDArray, box: BoundingBox) -> RecordingTrack | None:
+    """Return a track from a box on, or None where nothing can be learned."""
+    try:
+        return RecordingTrack(config, select_backend('cpu'), load_networks(config), image, box)
+    except LMSCOError:
+        return None
+
+
+def fit(records: Sequence[Records], columns: Sequence[int]) -> Array:
+    """
+    Return the coefficients of a logistic regression, the constant last.
+
+    Detections with an overlap above 0.5 count against those without any.
+    """
+    hints = np.concatenate([part.hints for part in records])[:, columns]
+    overlap = np.concatenate([part.overlap for part in records])
+    good, bad = overlap > 0.5, overlap == 0
+    weights = good * PRESENT_SHARE / good.sum() + bad * (1 - PRESENT_SHARE) / bad.sum()
+    inputs = np.c_[hints, np.ones(len(hints))]
+
+    def loss(values: Array) -> tuple[float, Array]:
+        odds = inputs @ values
+        slope = weights * (1 / (1 + np.exp(-odds)) - good)
+        ridge = 1e-3 * np.append(values[:-1], 0)
+        return (float(weights @ (np.logaddexp(0, odds) - good * odds) + values @ ridge),
+                slope @ inputs + 2 * ridge)
+
+    return minimize(loss, np.zeros(inputs.shape[1]), jac=True).x
+
+
+def separation(records: Sequence[Records], columns: Sequence[int], weights: Array) -> float:
+    """Return the chance that a detection on the target is trusted more than one off it."""
+    kept = [(part.overlap > 0.5) | (part.overlap == 0) for part in records]
+    scores = [part.hints[keep][:, columns] @ weights[:-1]
+              for part, keep in zip(records, kept, strict=True)]
+    terms = auroc_terms(scores, [part.overlap[keep]
+                                 for part, keep in zip(records, kept, strict=True)])
+    return float(auroc(*terms, np.ones(len(records))))
+
+
+if __name__ == '__main__':
+    main()
