@@ -188,7 +188,8 @@ def _moved(view: FrameView, box: BoundingBox,
     stretch = np.exp(rng.normal(0, 0.15) + rng.normal(0, 0.06, 2))
     rotation = np.array([[np.cos(turn), -np.sin(turn)], [np.sin(turn), np.cos(turn)]])
     linear = rotation @ np.diag(stretch)
-    center = np.array(box.center)
+    # OpenCV counts from the middle of the first pixel.
+    center = np.array(box.center) - 0.5
     matrix = np.column_stack([linear, center - linear @ center])
     image = cv2.warpAffine(view.image, matrix, view.size, flags=cv2.INTER_LINEAR,
                            borderMode=cv2.BORDER_REFLECT)
