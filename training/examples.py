@@ -116,14 +116,17 @@ class ExampleSource:
             Source of chance.
 
         """
-        moving = rng.random() < self._clip_share
-        sights = self._from_clip(count, rng) if moving else self._from_still(count, rng)
+        real = rng.random() < self._clip_share
+        sights = self._from_clip(count, rng) if real else self._from_still(count, rng)
+        elsewhere = None if real or rng.random() < 0.4 else self._elsewhere(sights[0][1], rng)
         inverted = rng.random() < 0.5
         patches, offsets = [], []
         for i, (view, box) in enumerate(sights):
             last = i == count - 1
             guess = jitter(box, searched if last else known, rng)
             patch = self._patch(view, guess)
+            if elsewhere is not None:
+                patch = self._transplant(patch, box, guess, elsewhere, rng)
             if last and rng.random() < 0.1:
                 patch = occlude(patch, self._size / self._factor, rng)
             patch = degrade(patch, rng)
@@ -141,6 +144,31 @@ class ExampleSource:
     def _sides(self, box: BoundingBox) -> tuple[float, float]:
         """Return the sides of the region around a box, over the factor."""
         return (box.area**0.5,) * 2 if self._square else box.size
+
+    def _elsewhere(self, box: BoundingBox,
+                   rng: np.random.Generator) -> tuple[FrameView, BoundingBox]:
+        """Return another image, and a box of the same size in it."""
+        still = self._stills[rng.integers(len(self._stills))]
+        height, width = still.image.shape
+        center = (rng.uniform(0, width), rng.uniform(0, height))
+        return still.view(), BoundingBox.from_center(center, box.size)
+
+    def _transplant(self, patch: Array, box: BoundingBox, guess: BoundingBox,
+                    elsewhere: tuple[FrameView, BoundingBox], rng: np.random.Generator) -> Array:
+        """Return the target in a patch before another background, near where that was before."""
+        view, place = elsewhere
+        drift = rng.normal(0, 0.5, 2) * box.area**0.5
+        background = self._patch(view, BoundingBox.from_center(
+            (place.center[0] + drift[0], place.center[1] + drift[1]), guess.size))
+        sides = np.array(self._sides(guess)) * self._factor
+        middle = self._size * (
+            0.5 + (np.array(box.center) - np.array(guess.center)) / sides) - 0.5
+        radii = 0.6 * self._size * np.array(box.size) / sides
+        axis = np.arange(self._size)
+        away = np.hypot((axis[None, :] - middle[0]) / radii[0],
+                        (axis[:, None] - middle[1]) / radii[1])
+        mask = np.clip((1.15 - away) / 0.3, 0, 1).astype(np.float32)
+        return background + mask * (patch - background)
 
     def _from_clip(self, count: int,
                    rng: np.random.Generator) -> list[tuple[FrameView, BoundingBox]]:
@@ -184,8 +212,8 @@ def offset_of(box: BoundingBox, guess: BoundingBox,
 def _moved(view: FrameView, box: BoundingBox,
            rng: np.random.Generator) -> tuple[FrameView, BoundingBox]:
     """Return the image turned a little around the target and stretched, with the new box."""
-    turn = np.deg2rad(rng.normal(0, 4))
-    stretch = np.exp(rng.normal(0, 0.15) + rng.normal(0, 0.06, 2))
+    turn = np.deg2rad(rng.normal(0, 6))
+    stretch = np.exp(rng.normal(0, 0.15) + rng.normal(0, 0.08, 2))
     rotation = np.array([[np.cos(turn), -np.sin(turn)], [np.sin(turn), np.cos(turn)]])
     linear = rotation @ np.diag(stretch)
     # OpenCV counts from the middle of the first pixel.
@@ -193,8 +221,30 @@ def _moved(view: FrameView, box: BoundingBox,
     matrix = np.column_stack([linear, center - linear @ center])
     image = cv2.warpAffine(view.image, matrix, view.size, flags=cv2.INTER_LINEAR,
                            borderMode=cv2.BORDER_REFLECT)
+    if rng.random() < 0.5:
+        image = _bent(image, box, rng)
     size = (box.width * stretch[0], box.height * stretch[1])
     return FrameView(image, view.intensity), BoundingBox.from_center(box.center, size)
+
+
+def _bent(image: npt.NDArray[np.uint8], box: BoundingBox,
+          rng: np.random.Generator) -> npt.NDArray[np.uint8]:
+    """Return the image bent smoothly around a box, as a walking person bends."""
+    width, height = (int(np.ceil(2 * side)) for side in box.size)
+    x, y = (int(round(c - side / 2)) for c, side in zip(box.center, (width, height), strict=True))
+    field = cv2.resize(rng.normal(0, 0.06 * box.area**0.5, (4, 4, 2)).astype(np.float32),
+                       (width, height), interpolation=cv2.INTER_CUBIC)
+    fade = np.hanning(width + 2)[None, 1:-1] * np.hanning(height + 2)[1:-1, None]
+    field *= fade[:, :, None].astype(np.float32)
+    columns, rows = np.meshgrid(np.arange(width), np.arange(height))
+    result = image.copy()
+    bent = cv2.remap(image, (x + columns + field[..., 0]).astype(np.float32),
+                     (y + rows + field[..., 1]).astype(np.float32), cv2.INTER_LINEAR,
+                     borderMode=cv2.BORDER_REPLICATE)
+    top, left = max(y, 0), max(x, 0)
+    inside = result[top:y + height, left:x + width]
+    inside[:] = bent[top - y:, left - x:][:inside.shape[0], :inside.shape[1]]
+    return result
 
 
 def _flip(example: Example, rng: np.random.Generator) -> Example:

@@ -101,7 +101,7 @@ class Still:
             return self.boxes[rng.integers(len(self.boxes))]
         height, width = self.image.shape
         side = float(np.exp(rng.uniform(*np.log(_NATURAL_SIDES))))
-        aspect = float(np.exp(rng.normal(0, 0.35)))
+        aspect = float(np.exp(rng.normal(0, 0.25)))
         center = (rng.uniform(0.2, 0.8) * width, rng.uniform(0.2, 0.8) * height)
         return BoundingBox.from_center(center, (side * aspect, side / aspect))
 
