@@ -39,9 +39,11 @@ SPOT = 0.15
 
 @pytest.fixture
 def plain(monkeypatch):
-    """Leave the patches as they are sampled."""
+    """Leave the patches as they are sampled, and the targets in one piece."""
     monkeypatch.setattr(examples, 'degrade', lambda patch, rng: patch)
     monkeypatch.setattr(examples, 'occlude', lambda patch, target, rng: patch)
+    monkeypatch.setattr(examples, '_bent', lambda image, box, rng: image)
+    monkeypatch.setattr(ExampleSource, '_transplant', lambda self, patch, *others: patch)
 
 
 @pytest.mark.parametrize('square, factor', [(True, 5.0), (False, 3.0)])
@@ -93,7 +95,7 @@ def test_offsets_are_zero_for_the_box_itself_and_count_in_sides():
         (0.5, -0.1, np.log(2), -np.log(2)))
 
 
-def test_box_follows_a_moved_image(spot, moments):
+def test_box_follows_a_moved_image(plain, spot, moments):
     """The center to a fiftieth of a pixel, the size by the area of the spot."""
     center, target = (90.3, 81.6), (40.0, 30.0)
     image = spot(center, target).astype(np.float32)
@@ -110,6 +112,39 @@ def test_box_follows_a_moved_image(spot, moments):
         factors.append((its_box.area / box.area)**0.5)
         assert np.sqrt(np.prod(spread) / np.prod(before)) == pytest.approx(factors[-1], rel=0.02)
     assert min(factors) < 0.9 and max(factors) > 1.1
+
+
+@pytest.mark.parametrize('center', [(90.3, 81.6), (4.0, 3.0), (197.5, 158.0)])
+def test_only_what_is_near_the_target_bends(rng, center):
+    image = rng.integers(0, 255, (160, 200)).astype(np.uint8)
+    kept = image.copy()
+    box = BoundingBox.from_center(center, (40.0, 30.0))
+    bent = examples._bent(image, box, rng)
+    assert bent.shape == image.shape and bent.dtype == image.dtype
+    np.testing.assert_array_equal(image, kept)
+    rows, columns = np.nonzero(bent != image)
+    assert len(rows) > 100
+    assert np.abs(columns + 0.5 - center[0]).max() <= 41
+    assert np.abs(rows + 0.5 - center[1]).max() <= 31
+
+
+def test_a_transplanted_target_stays_in_place_before_another_background(clip, rng):
+    size, factor = 100, 4.0
+    source = ExampleSource([clip], [], size, factor, True, 1.0)
+    box = BoundingBox.from_center((80, 70), (36, 24))
+    guess = BoundingBox.from_center((90, 66), (40, 24))
+    patch = rng.random((size, size)).astype(np.float32)
+    dark = FrameView(np.zeros((160, 200), np.uint8), IntensityRange(0, 255))
+    found = source._transplant(patch, box, guess, (dark, box), rng)
+    assert found.dtype == np.float32 and found.shape == patch.shape
+    x, y, *_ = offset_of(box, guess, (guess.area**0.5,) * 2)
+    middle = size * (0.5 + np.array([x, y]) / factor)
+    sides = np.array(box.size) / guess.area**0.5 * size / factor
+    axis = np.arange(size) + 0.5
+    away = np.hypot((axis[None, :] - middle[0]) / sides[0], (axis[:, None] - middle[1]) / sides[1])
+    np.testing.assert_array_equal(found[away < 0.5], patch[away < 0.5])
+    np.testing.assert_array_equal(found[away > 0.7], 0)
+    assert (found[away > 0.7].size, found[away < 0.5].size) > (5000, 100)
 
 
 def test_mirror_images_mirror_patches_and_offsets_alike(rng):
