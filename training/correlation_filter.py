@@ -69,7 +69,7 @@ class CorrelationFilter:
 
         """
         sigma = max(self.label_sigma / self.search_factor, 0.6 / cells)
-        grid = torch.arange(cells) / cells
+        grid = torch.arange(cells, dtype=shift.dtype, device=shift.device) / cells
         away = (grid[None, :, None] - shift[:, None, :] + 0.5) % 1.0 - 0.5
         axes = torch.exp(-0.5 * (away / sigma)**2)
         return axes[:, :, 1, None] * axes[:, None, :, 0]
@@ -90,7 +90,8 @@ class CorrelationFilter:
         """Return spectra (..., C, N, N // 2 + 1) of normalized, windowed maps (..., C, N, N)."""
         energy = maps.square().mean(dim=(-3, -2, -1), keepdim=True)
         cells = maps.shape[-1]
-        hann = torch.hann_window(cells + 2, periodic=False)[1:-1]
+        hann = torch.hann_window(cells + 2, periodic=False, dtype=maps.dtype,
+                                 device=maps.device)[1:-1]
         windowed = maps * torch.rsqrt(energy + 1e-6) * (hann[:, None] * hann[None, :])
         return torch.fft.rfft2(windowed) / cells**2
 
@@ -110,11 +111,15 @@ class CorrelationFilter:
 
         """
         cells = samples.shape[-2]
-        label = torch.fft.rfft2(self.label(cells, torch.zeros(1, 2))) / cells**2
-        gamma = self.window(cells).square()
-        energy = samples.abs().square().mean(dim=1) + gamma.mean()
-        columns = torch.full((cells // 2 + 1,), 2.0)
+        strength = samples.abs().square().mean(dim=1)
+        label = torch.fft.rfft2(self.label(cells, strength.new_zeros(1, 2))) / cells**2
+        gamma = self.window(cells).square().to(strength)
+        energy = strength + gamma.mean()
+        # How often each column of the half spectrum stands in the whole one.
+        columns = torch.full_like(strength[0, 0, 0], 2.0)
         columns[0] = 1.0
+        if cells % 2 == 0:
+            columns[-1] = 1.0
 
         def normal(filters: torch.Tensor) -> torch.Tensor:
             scores = (samples * filters[:, None]).sum(dim=2, keepdim=True)

@@ -80,10 +80,12 @@ def occlude(patch: Patch, target: float, rng: np.random.Generator) -> Patch:
 
 
 def _motion_blur(patch: Patch, rng: np.random.Generator) -> Patch:
-    """Return the patch smeared along a random line."""
-    length = int(rng.integers(2, 6))
-    kernel = np.zeros((length, length), np.float32)
-    ends = [(0, int(rng.integers(length))), (length - 1, int(rng.integers(length)))]
-    cv2.line(kernel, *(end if rng.random() < 0.5 else end[::-1] for end in ends), 1.0)
-    return cv2.filter2D(patch, -1, kernel / max(float(kernel.sum()), 1.0),
-                        borderType=cv2.BORDER_REPLICATE)
+    """Return the patch smeared along a random line, evenly to both sides."""
+    reach = int(rng.integers(1, 3))
+    end = (reach, int(rng.integers(-reach, reach + 1)))
+    dx, dy = end if rng.random() < 0.5 else end[::-1]
+    kernel = np.zeros((2 * reach + 1, 2 * reach + 1), np.float32)
+    cv2.line(kernel, (reach - dx, reach - dy), (reach + dx, reach + dy), 1.0)
+    # A slanted line of pixels is not symmetric; with its mirror image it moves nothing.
+    kernel = kernel + kernel[::-1, ::-1]
+    return cv2.filter2D(patch, -1, kernel / float(kernel.sum()), borderType=cv2.BORDER_REPLICATE)

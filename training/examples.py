@@ -92,12 +92,15 @@ class ExampleSource:
         Whether regions are square, as the filter's, or have the shape of the target.
     clip_share : float
         Share of the examples that come from clips.
+    bystanders : int
+        Largest number of other targets beside the one that is meant, in square regions.
 
     """
 
     def __init__(self, clips: Sequence[Clip], stills: Sequence[Still], size: int, factor: float,
-                 square: bool, clip_share: float) -> None:
+                 square: bool, clip_share: float, bystanders: int = 0) -> None:
         self._clips, self._stills = clips, stills
+        self._bystanders = (0, bystanders + 1)
         self._size, self._factor, self._square = size, factor, square
         self._clip_share = clip_share if stills else 1.0
 
@@ -119,6 +122,7 @@ class ExampleSource:
         real = rng.random() < self._clip_share
         sights = self._from_clip(count, rng) if real else self._from_still(count, rng)
         elsewhere = None if real or rng.random() < 0.4 else self._elsewhere(sights[0][1], rng)
+        others = [self._bystander(rng) for _ in range(rng.integers(*self._bystanders))]
         inverted = rng.random() < 0.5
         patches, offsets = [], []
         for i, (view, box) in enumerate(sights):
@@ -127,6 +131,9 @@ class ExampleSource:
             patch = self._patch(view, guess)
             if elsewhere is not None:
                 patch = self._transplant(patch, box, guess, elsewhere, rng)
+            middle = self._middle(box, guess)
+            for other in others:
+                patch = self._beside(patch, middle, other, rng)
             if last and rng.random() < 0.1:
                 patch = occlude(patch, self._size / self._factor, rng)
             patch = degrade(patch, rng)
@@ -161,14 +168,39 @@ class ExampleSource:
         background = self._patch(view, BoundingBox.from_center(
             (place.center[0] + drift[0], place.center[1] + drift[1]), guess.size))
         sides = np.array(self._sides(guess)) * self._factor
-        middle = self._size * (
-            0.5 + (np.array(box.center) - np.array(guess.center)) / sides) - 0.5
-        radii = 0.6 * self._size * np.array(box.size) / sides
-        axis = np.arange(self._size)
-        away = np.hypot((axis[None, :] - middle[0]) / radii[0],
-                        (axis[:, None] - middle[1]) / radii[1])
-        mask = np.clip((1.15 - away) / 0.3, 0, 1).astype(np.float32)
+        mask = _ellipse(self._size, self._middle(box, guess),
+                        0.6 * self._size * np.array(box.size) / sides)
         return background + mask * (patch - background)
+
+    def _middle(self, box: BoundingBox, guess: BoundingBox) -> npt.NDArray[np.float64]:
+        """Return where, in pixels (x, y) of the patch around the guess, the box has its middle."""
+        sides = np.array(self._sides(guess)) * self._factor
+        away = (np.array(box.center) - np.array(guess.center)) / sides
+        return self._size * (0.5 + away) - 0.5
+
+    def _bystander(self, rng: np.random.Generator) -> tuple[Array, float]:
+        """Return the patch of another target, and its height over its width."""
+        if not self._stills or rng.random() < self._clip_share:
+            (view, box), = self._from_clip(1, rng)
+        else:
+            (view, box), = self._from_still(1, rng)
+        return self._patch(view, box), box.height / box.width
+
+    def _beside(self, patch: Array, middle: npt.NDArray[np.float64], other: tuple[Array, float],
+                rng: np.random.Generator) -> Array:
+        """Return the patch with another target, as bright as the one in its middle, beside it."""
+        side = self._size / self._factor
+        turn, reach = rng.uniform(0, 2 * np.pi), rng.uniform(1.2, 2.4) * side
+        place = np.round(middle + reach * np.array([np.cos(turn), np.sin(turn)])).astype(int)
+        radii = 0.6 * side * np.array([other[1]**-0.5, other[1]**0.5])
+        home = (self._size - 1) // 2
+        moved = np.roll(other[0], (place[1] - home, place[0] - home), axis=(0, 1))
+        mask = _ellipse(self._size, place, radii)
+        target = _ellipse(self._size, middle, (side / 2, side / 2))
+        mean, spread = _moments(patch, target)
+        other_mean, other_spread = _moments(moved, mask)
+        alike = (moved - other_mean) * (spread / (other_spread + 0.02)) + mean
+        return (patch + mask * (alike - patch)).astype(np.float32)
 
     def _from_clip(self, count: int,
                    rng: np.random.Generator) -> list[tuple[FrameView, BoundingBox]]:
@@ -188,6 +220,21 @@ class ExampleSource:
         box = still.pick(rng)
         view = still.view()
         return [(view, box)] + [moved(view, box, rng) for _ in range(count - 1)]
+
+
+def _ellipse(size: int, middle: npt.ArrayLike, radii: npt.ArrayLike) -> Array:
+    """Return a mask, shape (size, size), that falls softly from 1 to 0 around an ellipse."""
+    axis = np.arange(size)
+    (x, y), (width, height) = middle, radii
+    away = np.hypot((axis[None, :] - x) / width, (axis[:, None] - y) / height)
+    return np.clip((1.15 - away) / 0.3, 0, 1).astype(np.float32)
+
+
+def _moments(patch: Array, mask: Array) -> tuple[float, float]:
+    """Return mean and standard deviation under a mask."""
+    total = float(mask.sum()) + 1e-6
+    mean = float((patch * mask).sum()) / total
+    return mean, float(np.sqrt(((patch - mean)**2 * mask).sum() / total))
 
 
 def jitter(box: BoundingBox, spread: Spread, rng: np.random.Generator) -> BoundingBox:
@@ -216,7 +263,8 @@ def moved(view: FrameView, box: BoundingBox,
     stretch = np.exp(rng.normal(0, 0.15) + rng.normal(0, 0.08, 2))
     rotation = np.array([[np.cos(turn), -np.sin(turn)], [np.sin(turn), np.cos(turn)]])
     linear = rotation @ np.diag(stretch)
-    center = np.array(box.center)
+    # OpenCV counts from the middle of the first pixel.
+    center = np.array(box.center) - 0.5
     matrix = np.column_stack([linear, center - linear @ center])
     image = cv2.warpAffine(view.image, matrix, view.size, flags=cv2.INTER_LINEAR,
                            borderMode=cv2.BORDER_REFLECT)

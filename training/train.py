@@ -117,7 +117,7 @@ def _parts(name: str, settings: Mapping[str, Any]) -> tuple[
         return (ThermalFlowNet(), objective, batches,
                 lambda clips, stills: FlowSource(clips, size, factor))
     return ThermalNet(), objective, batches, lambda clips, stills: ExampleSource(
-        clips, stills, size, factor, True, settings['clip_share'])
+        clips, stills, size, factor, True, settings['clip_share'], settings['bystanders'])
 
 
 def _verification(settings: Mapping[str, Any]) -> tuple[
