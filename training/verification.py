@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Trains the verification network: is the target of the first frame in a patch?"""
+"""Trains the verification network: whether the target of the first frame is in a patch."""
 
 from __future__ import annotations
 

@@ -80,7 +80,8 @@ class Pursuit:
             box.center, self._velocity, image_size, strict=True))
         return box.moved_to((x, y))
 
-    def slice(self, image_size: tuple[int, int], side: float, around: _Point) -> list[_Point]:
+    def slice(self, image_size: tuple[int, int], side: float, around: _Point,
+              slices: int = 1) -> list[_Point]:
         """
         Return the centers of the regions to be searched in this frame.
 
@@ -92,10 +93,12 @@ class Pursuit:
             Side of a region.
         around : tuple of float
             Where the search begins, if it does so in this frame.
+        slices : int
+            How many slices at once.
 
         """
         if not self._order:
             self._order, self._next = search_tiles(image_size, side, around), 0
-        count = min(self._tiles, len(self._order))
+        count = min(slices * self._tiles, len(self._order))
         first, self._next = self._next, self._next + count
         return [self._order[(first + i) % len(self._order)] for i in range(count)]

@@ -148,7 +148,9 @@ class Track:
         for place in self._distractors.places:
             self._distractors.explain(
                 self._detector(view, expected.moved_to(place)).center, self._box)
-        places = self._pursuit.slice(view.size, here.region.width, expected.center)
+        # While the shutter was closed the target may have got further than in a frame.
+        slices = 2 if self._frozen else 1
+        places = self._pursuit.slice(view.size, here.region.width, expected.center, slices)
         found = [self._detector(view, expected.moved_to(place)) for place in places]
         for other in sorted(found, key=lambda detection: -detection.sharpness)[:2]:
             # The window of a tile dims what lies off its center: look again from there.

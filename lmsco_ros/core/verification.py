@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Comparison with the first frame: is what the filter has found the target at all?"""
+"""Comparison with the first frame: whether what the filter has found is the target."""
 
 from __future__ import annotations
 

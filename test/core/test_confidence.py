@@ -22,10 +22,13 @@ import pytest
 
 from lmsco_ros.core.confidence import ConfidenceMonitor, Evidence, peak_to_sidelobe_ratio
 from lmsco_ros.core.config import ConfidenceConfig
+from lmsco_ros.core.trust import trust
 from lmsco_ros.core.types import TrackState
 
-CONFIG = ConfidenceConfig(reference_frames=4, uncertain=0.5, lost=0.2, lost_frames=3, found=0.6,
-                          absent=0.2, present=0.6, tiles=4)
+CONFIG = ConfidenceConfig(reference_frames=4, uncertain=0.5, certain=0.6, lost=0.2,
+                          lost_frames=3, found=0.8, sharp=0.4, alike=0.3)
+CLEAR = Evidence(10.0, presence=4.0)
+GONE = Evidence(1.0, likeness=0.0, presence=-5.0)
 
 
 @pytest.fixture
@@ -33,7 +36,7 @@ def monitor():
     """Return a monitor whose reference is a sharpness of 10."""
     result = ConfidenceMonitor(CONFIG)
     for _ in range(4):
-        assert result.judge(Evidence(10.0)) is TrackState.TRACKING
+        assert result.judge(CLEAR) is TrackState.TRACKING
     return result
 
 
@@ -76,49 +79,95 @@ def test_flat_scores_are_not_sharp():
     assert peak_to_sidelobe_ratio(np.full((9, 9), 3.3, np.float32), 1) < 1
 
 
-def test_sharp_frames_keep_tracking(monitor):
+def at_score(monitor, score):
+    """Return evidence of a given score, by the presence alone."""
+    low, high = -8.0, 8.0
+    for _ in range(60):
+        middle = (low + high) / 2
+        below = monitor.score(Evidence(10.0, presence=middle)) < score
+        low, high = (middle, high) if below else (low, middle)
+    return Evidence(10.0, presence=high)
+
+
+def test_clear_frames_keep_tracking(monitor):
     for sharpness in (9, 14, 6, 5.1):
-        assert monitor.believable(Evidence(sharpness))
-        assert monitor.judge(Evidence(sharpness)) is TrackState.TRACKING
+        evidence = Evidence(sharpness, presence=4.0)
+        assert monitor.believable(evidence)
+        assert monitor.judge(evidence) is TrackState.TRACKING and monitor.learns
 
 
-def test_dull_frame_is_uncertain_but_believed(monitor):
-    assert monitor.believable(Evidence(4))
-    assert monitor.judge(Evidence(4)) is TrackState.UNCERTAIN
-    assert monitor.judge(Evidence(8)) is TrackState.TRACKING
+def test_doubtful_frame_is_believed_but_not_learned_from(monitor):
+    doubtful = at_score(monitor, 0.35)
+    assert monitor.believable(doubtful)
+    assert monitor.judge(doubtful) is TrackState.UNCERTAIN and not monitor.learns
+
+
+def test_state_does_not_flicker_between_two_thresholds(monitor):
+    between = at_score(monitor, 0.55)
+    assert monitor.judge(between) is TrackState.TRACKING
+    monitor.judge(at_score(monitor, 0.45))
+    assert monitor.judge(between) is TrackState.UNCERTAIN
+    assert monitor.judge(at_score(monitor, 0.65)) is TrackState.TRACKING
+    assert monitor.judge(between) is TrackState.TRACKING
 
 
 def test_target_is_lost_after_enough_misses_in_a_row(monitor):
-    assert not monitor.believable(Evidence(1))
-    states = [monitor.judge(Evidence(1)) for _ in range(4)]
+    assert not monitor.believable(GONE)
+    states = [monitor.judge(GONE) for _ in range(4)]
     assert states == [TrackState.UNCERTAIN] * 2 + [TrackState.LOST] * 2
 
 
 def test_misses_must_be_in_a_row(monitor):
     for _ in range(5):
-        assert monitor.judge(Evidence(1)) is not TrackState.LOST
-        assert monitor.judge(Evidence(1)) is not TrackState.LOST
-        assert monitor.judge(Evidence(9)) is TrackState.TRACKING
+        assert monitor.judge(GONE) is not TrackState.LOST
+        assert monitor.judge(GONE) is not TrackState.LOST
+        assert monitor.judge(CLEAR) is TrackState.TRACKING
 
 
-def test_lost_target_needs_a_clear_frame_to_be_found(monitor):
+@pytest.mark.parametrize('lack', [
+    Evidence(10.0, 0.2, 4.0), Evidence(3.5, 1.0, 4.0), Evidence(10.0, 1.0, -0.1)],
+    ids=['first filter', 'filter', 'comparison'])
+def test_lost_target_is_found_when_all_three_agree(monitor, lack):
     for _ in range(3):
-        monitor.judge(Evidence(1))
-    assert monitor.state is TrackState.LOST
-    assert not monitor.believable(Evidence(5.5))
-    assert monitor.judge(Evidence(5.5)) is TrackState.LOST
-    assert monitor.believable(Evidence(6.5))
-    assert monitor.judge(Evidence(6.5)) is TrackState.TRACKING
-    assert monitor.state is TrackState.TRACKING
+        monitor.judge(GONE)
+    assert not monitor.convincing(lack) and not monitor.believable(lack)
+    assert monitor.judge(lack) is TrackState.LOST
+    assert monitor.convincing(CLEAR)
+    assert monitor.judge(CLEAR) is TrackState.TRACKING
+
+
+def test_without_a_network_the_filters_have_to_agree(monitor):
+    for _ in range(3):
+        monitor.judge(GONE)
+    assert not monitor.convincing(Evidence(10.0, 0.2)) and not monitor.convincing(Evidence(3.5))
+    assert monitor.judge(Evidence(9.0)) is TrackState.TRACKING
+
+
+def test_a_jump_needs_a_better_frame(monitor):
+    doubtful = at_score(monitor, 0.35)
+    assert monitor.believable(replace(doubtful, jump=0.9))
+    assert not monitor.believable(replace(doubtful, jump=1.1))
+    assert monitor.believable(replace(at_score(monitor, 0.51), jump=1.1))
+
+
+def test_monitor_that_always_learns_believes_everything_and_still_judges():
+    monitor = ConfidenceMonitor(replace(CONFIG, learn='always'))
+    monitor.judge(CLEAR)
+    states = []
+    for _ in range(3):
+        assert monitor.believable(GONE)
+        states.append(monitor.judge(GONE))
+        assert monitor.learns
+    assert states == [TrackState.UNCERTAIN] * 2 + [TrackState.LOST]
 
 
 def test_reference_is_the_median_of_the_first_frames_only(monitor):
     for _ in range(50):
-        monitor.judge(Evidence(100))
+        monitor.judge(Evidence(100.0, presence=4.0))
     assert monitor.quality(10) == pytest.approx(1)
     late = ConfidenceMonitor(CONFIG)
     for sharpness in (8, 12, 100, 10):
-        late.judge(Evidence(sharpness))
+        late.judge(Evidence(sharpness, presence=4.0))
     assert late.quality(11) == pytest.approx(1)
 
 
@@ -126,49 +175,40 @@ def test_first_frame_is_believed():
     assert ConfidenceMonitor(CONFIG).believable(Evidence(0.5))
 
 
-def test_score_is_a_trust_between_zero_and_one(monitor):
-    scores = [monitor.score(Evidence(sharpness)) for sharpness in (-3, 0, 1, 5, 10, 20, 100)]
-    assert scores == sorted(scores)
-    assert all(0 <= score <= 1 for score in scores)
-    assert scores[1] == 0 and scores[4] > 0.5
+@pytest.mark.parametrize('sharpness', [0.0, -3.0, float('nan'), float('inf')])
+def test_frame_that_shows_nothing_is_not_believed_and_sets_no_reference(sharpness):
+    monitor = ConfidenceMonitor(CONFIG)
+    blank = Evidence(sharpness, presence=4.0)
+    assert monitor.score(blank) == 0 and not monitor.believable(blank)
+    assert monitor.judge(blank) is not TrackState.TRACKING
+    monitor.judge(Evidence(8.0))
+    assert monitor.quality(8.0) == pytest.approx(1)
+
+
+@given(quality=st.floats(0.01, 6), likeness=st.floats(-1, 2), more=st.floats(0, 2),
+       presence=st.one_of(st.none(), st.floats(-20, 20)))
+def test_trust_is_a_probability_that_grows_with_each_hint(quality, likeness, more, presence):
+    one = trust(quality, likeness, presence)
+    assert 0 < one < 1
+    assert trust(quality + more, likeness, presence) >= one
+    assert trust(quality, likeness + more, presence) >= one
+    if presence is not None:
+        assert trust(quality, likeness, presence + more) >= one
+
+
+def test_trust_is_the_logistic_function_of_the_weighted_hints():
+    odds = 1.47 * np.log(0.5) + 1.07 * 0.8 + 0.84 * 1.5 - 0.10
+    assert trust(0.5, 0.8, 1.5) == pytest.approx(1 / (1 + np.exp(-odds)))
+    odds = 1.11 * np.log(0.5) + 4.05 * 0.8 - 0.46
+    assert trust(0.5, 0.8, None) == pytest.approx(1 / (1 + np.exp(-odds)))
+
+
+def test_values_that_are_no_numbers_speak_against_the_target():
+    assert trust(1.0, float('nan'), float('nan')) == trust(1.0, -0.5, -8.0)
 
 
 def test_monitors_do_not_share_what_they_saw(monitor):
     other = ConfidenceMonitor(CONFIG)
-    other.judge(Evidence(2.0))
+    other.judge(Evidence(2.0, presence=4.0))
     assert other.quality(2.0) == pytest.approx(1)
     assert monitor.quality(10.0) == pytest.approx(1)
-
-
-@pytest.mark.parametrize('sharpness, presence, state, believed', [
-    (10, 0.9, TrackState.TRACKING, True), (10, 0.5, TrackState.UNCERTAIN, True),
-    (4, 0.9, TrackState.UNCERTAIN, True), (10, 0.1, TrackState.UNCERTAIN, False),
-    (1, 0.9, TrackState.UNCERTAIN, False)])
-def test_frame_must_be_sharp_and_show_the_target(monitor, sharpness, presence, state, believed):
-    evidence = Evidence(sharpness, presence)
-    assert monitor.believable(evidence) == believed
-    assert monitor.judge(evidence) is state
-
-
-@pytest.mark.parametrize('evidence', [Evidence(10, 0.1), Evidence(1, 0.9)])
-def test_either_lack_loses_the_target_and_both_must_be_there_to_find_it(monitor, evidence):
-    assert [monitor.judge(evidence) for _ in range(3)][-1] is TrackState.LOST
-    for unclear in (Evidence(10, 0.5), Evidence(5.5, 0.9)):
-        assert not monitor.convincing(unclear)
-        assert monitor.judge(unclear) is TrackState.LOST
-    assert monitor.judge(Evidence(6.5, 0.7)) is TrackState.TRACKING
-
-
-def test_trust_falls_with_the_presence(monitor):
-    scores = [monitor.score(Evidence(10, presence)) for presence in (0, 0.3, 1)]
-    assert scores[0] == 0 and scores[1] == pytest.approx(0.3 * scores[2])
-
-
-@pytest.mark.parametrize('lost', [0.2, 0.0])
-def test_frames_that_show_nothing_set_no_reference(lost):
-    monitor = ConfidenceMonitor(replace(CONFIG, lost=lost))
-    blank = Evidence(0.0)
-    assert monitor.judge(blank) is not TrackState.TRACKING or lost == 0
-    assert monitor.believable(blank) == (lost == 0) and monitor.score(blank) == 0
-    monitor.judge(Evidence(8.0))
-    assert monitor.quality(8.0) == pytest.approx(1)

@@ -23,7 +23,7 @@ import yaml
 from lmsco_ros.core import ConfigError, TrackerConfig
 from lmsco_ros.core.config import (
     ChannelConfig, ConfidenceConfig, FeatureConfig, IntensityConfig, LearningConfig, MotionConfig,
-    NetworkConfig, RegistrationConfig, RuntimeConfig, SamplingConfig, ScaleConfig)
+    NetworkConfig, RuntimeConfig, SamplingConfig, ScaleConfig, VerificationConfig)
 
 weights = st.floats(0.01, 100)
 words = st.text(st.characters(codec='utf-8', exclude_categories=['Cc', 'Cs']), min_size=1)
@@ -43,8 +43,7 @@ configs = st.builds(
                        patch_size_max=st.integers(200, 1024)),
     networks=st.builds(NetworkConfig, words, words, words | st.just('')),
     motion=st.builds(MotionConfig, st.booleans(), st.floats(0, 100)),
-    registration=st.builds(RegistrationConfig, words | st.just(''), st.floats(0, 1),
-                           st.floats(0, 1), st.floats(0, 2)),
+    verification=st.builds(VerificationConfig, words | st.just('')),
     learning=st.builds(LearningConfig, anchor=st.sampled_from(['unit', 'coupled', 'frozen']),
                        solve=st.sampled_from(['joint', 'per_block']), core=st.floats(0, 1),
                        window_minimum=st.floats(1e-6, 1), window_edge=st.floats(1, 1e3),
@@ -53,8 +52,9 @@ configs = st.builds(
                     step=st.floats(1.001, 1.15), exponent_min=st.integers(-9, 0),
                     exponent_max=st.integers(0, 9)),
     confidence=st.builds(ConfidenceConfig, lost=st.floats(0, 0.1),
-                         uncertain=st.floats(0.1, 1), found=st.floats(0.1, 2),
-                         absent=st.floats(0, 0.3), present=st.floats(0.3, 1)),
+                         uncertain=st.floats(0.1, 0.5), certain=st.floats(0.5, 1),
+                         found=st.floats(0.1, 1), sharp=st.floats(0, 2), alike=st.floats(-1, 2),
+                         learn=st.sampled_from(['tracking', 'always'])),
     runtime=st.builds(RuntimeConfig, device=st.sampled_from(['cpu', 'cuda', 'cuda:1']),
                       threads=st.integers(1, 256)),
     newton_steps=st.integers(0, 100))
@@ -215,9 +215,8 @@ BOUNDS = [
     (ScaleConfig, 'model_area', 63, 65537), (ScaleConfig, 'padding', 0.9, 4.1),
     (ScaleConfig, 'regularization', 0, 101), (ScaleConfig, 'label_sigma', 0, 51),
     (MotionConfig, 'least_motion', -0.1, 101),
-    (RegistrationConfig, 'center_rate', -0.1, 1.1), (RegistrationConfig, 'size_rate', -0.1, 1.1),
-    (RegistrationConfig, 'tolerance', -0.1, 2.1), (ConfidenceConfig, 'absent', -0.1, 1.1),
-    (ConfidenceConfig, 'present', 0, 1.1),
+    (ConfidenceConfig, 'found', 0.05, 1.1), (ConfidenceConfig, 'certain', 0.4, 1.1),
+    (ConfidenceConfig, 'sharp', -0.1, 2.1), (ConfidenceConfig, 'alike', -1.1, 2.1),
     (ConfidenceConfig, 'reference_frames', 0, 1001), (ConfidenceConfig, 'lost_frames', 0, 1001),
     (ConfidenceConfig, 'tiles', -1, 65), (RuntimeConfig, 'threads', 0, 257),
     (TrackerConfig, 'newton_steps', -1, 101),
@@ -238,7 +237,7 @@ def test_bounds_name_the_field_the_value_and_the_range(kind, name, low, high):
     {'learning': {'window_minimum': 0.5, 'window_edge': 0.1}},
     {'confidence': {'lost': 0.5, 'uncertain': 0.3, 'found': 0.6}},
     {'confidence': {'lost': 0.5, 'uncertain': 0.6, 'found': 0.3}},
-    {'confidence': {'absent': 0.5, 'present': 0.3}},
+    {'confidence': {'uncertain': 0.5, 'certain': 0.3}},
 ])
 def test_ranges_must_not_be_turned_round(values):
     with pytest.raises(ConfigError, match='expected a value in'):

@@ -23,13 +23,10 @@ from safetensors.numpy import load_file
 import torch
 
 from lmsco_ros.core.backbones.formats import read_arrays
-from lmsco_ros.core.backbones.registration import RegistrationNet
 from lmsco_ros.core.backbones.registry import find_source
 from lmsco_ros.core.backbones.thermal import ThermalNet
 from lmsco_ros.core.backbones.weights import fitting_arrays
-from lmsco_ros.core.types import BoundingBox
 from training.loop import Batch, Schedule, take, train
-from training.registration import _overlap, RegistrationObjective
 
 SCHEDULE = Schedule(minutes=1e6, steps=60, learning_rate=0.1, weight_decay=0.0, log_interval=20,
                     device='cpu')
@@ -131,35 +128,3 @@ def test_trained_weights_are_those_of_a_backbone(tmp_path):
     expected, = network(images, ['features'])
     torch.testing.assert_close(loaded(images, ['features'])[0], expected.detach(), rtol=1e-4,
                                atol=1e-5)
-
-
-def test_overlap_is_that_of_boxes(rng):
-    values = torch.from_numpy(rng.normal(0, 0.4, (2, 20, 4)))
-    found = _overlap(*values)
-    for i in range(20):
-        one, other = (BoundingBox.from_center(tuple(box[:2]), tuple(np.exp(box[2:])))
-                      for box in values[:, i].numpy())
-        assert float(found[i]) == pytest.approx(one.overlap(other), abs=1e-9)
-
-
-def test_box_counts_only_where_the_target_is(rng):
-    """An absent target has no box to be wrong about, but its presence is learned."""
-    torch.manual_seed(3)
-    network = RegistrationNet()
-    inputs = torch.from_numpy(rng.random((4, 2, 1, 64, 64)).astype(np.float32))
-    targets = torch.zeros(4, 1, 5)
-    targets[:2, 0, 4] = 1
-
-    @torch.no_grad()
-    def loss(targets, presence_weight=0.3):
-        objective = RegistrationObjective(tolerance=0.1, presence_weight=presence_weight)
-        return float(objective(network, Batch(inputs, targets)))
-    elsewhere = targets.clone()
-    elsewhere[2:, 0, :4] = 0.7
-    assert loss(elsewhere) == pytest.approx(loss(targets))
-    elsewhere[0, 0, :4] = 0.7
-    assert loss(elsewhere) > loss(targets) + 0.1
-    gone = targets.clone()
-    gone[:, 0, 4] = 0
-    assert loss(gone, presence_weight=0.0) == 0 < loss(gone)
-    assert loss(gone, presence_weight=0.6) == pytest.approx(2 * loss(gone))
