@@ -363,11 +363,11 @@ class ConfidenceConfig:
 
     learn: str = 'tracking'
     reference_frames: int = 10
-    uncertain: float = 0.5
-    certain: float = 0.6
-    lost: float = 0.1
+    uncertain: float = 0.7
+    certain: float = 0.75
+    lost: float = 0.3
     lost_frames: int = 5
-    found: float = 0.8
+    found: float = 0.9
     sharp: float = 0.4
     alike: float = 0.3
     tiles: int = 4

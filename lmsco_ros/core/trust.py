@@ -15,10 +15,10 @@
 """
 The probability that a detection is the target, from all that speaks for it.
 
-A logistic regression, fitted by `python -m training.trust` on clips of the train part that the
-verification network never saw, as they are and under challenges, on detections that overlap the
-target by more than a half or not at all. The former weigh nine times as much as the latter, as
-while a target is followed: a score of 0.5 is rather a sign of its absence.
+A logistic regression, fitted by `python -m training.trust --data DATA` on clips of the train part
+that the verification network never saw, as they are and under challenges, on detections that
+overlap the target by more than a half or not at all. The former weigh nine times as much as the
+latter, as while a target is followed: a score of 0.5 is rather a sign of its absence.
 """
 
 from __future__ import annotations
@@ -57,8 +57,8 @@ class TrustModel:
     constant: float
 
 
-VERIFIED = TrustModel(quality=1.47, likeness=1.07, presence=0.84, constant=-0.10)
-UNVERIFIED = TrustModel(quality=1.11, likeness=4.05, presence=0.0, constant=-0.46)
+VERIFIED = TrustModel(quality=1.26, likeness=1.53, presence=0.42, constant=1.81)
+UNVERIFIED = TrustModel(quality=2.09, likeness=2.23, presence=0.0, constant=2.47)
 
 
 def regressors(quality: float, likeness: float, presence: float) -> tuple[float, float, float]:

@@ -80,13 +80,13 @@ def test_flat_scores_are_not_sharp():
 
 
 def at_score(monitor, score):
-    """Return evidence of a given score, by the presence alone."""
-    low, high = -8.0, 8.0
+    """Return evidence of a given score, by the sharpness alone."""
+    low, high = 0.2, 50.0
     for _ in range(60):
         middle = (low + high) / 2
-        below = monitor.score(Evidence(10.0, presence=middle)) < score
+        below = monitor.score(Evidence(middle, 0.5, 0.0)) < score
         low, high = (middle, high) if below else (low, middle)
-    return Evidence(10.0, presence=high)
+    return Evidence(high, 0.5, 0.0)
 
 
 def test_clear_frames_keep_tracking(monitor):
@@ -197,9 +197,9 @@ def test_trust_is_a_probability_that_grows_with_each_hint(quality, likeness, mor
 
 
 def test_trust_is_the_logistic_function_of_the_weighted_hints():
-    odds = 1.47 * np.log(0.5) + 1.07 * 0.8 + 0.84 * 1.5 - 0.10
+    odds = 1.26 * np.log(0.5) + 1.53 * 0.8 + 0.42 * 1.5 + 1.81
     assert trust(0.5, 0.8, 1.5) == pytest.approx(1 / (1 + np.exp(-odds)))
-    odds = 1.11 * np.log(0.5) + 4.05 * 0.8 - 0.46
+    odds = 2.09 * np.log(0.5) + 2.23 * 0.8 + 2.47
     assert trust(0.5, 0.8, None) == pytest.approx(1 / (1 + np.exp(-odds)))
 
 
