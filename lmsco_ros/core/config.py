@@ -169,8 +169,13 @@ def _presets() -> Mapping[str, TrackerConfig]:
     unscaled = replace(paper, scale=ScaleConfig('none'))
     return {
         'default': TrackerConfig(
-            features=(FeatureConfig((ChannelConfig('appearance', layer='features'),)),),
+            features=(FeatureConfig((
+                ChannelConfig('appearance', power=0.5, layer='features'),
+                *HANDCRAFTED[0].channels)),),
             sampling=SamplingConfig(patch_size_min=100, patch_size_max=100),
+            learning=LearningConfig(iterations=1, gradient_steps=1, update_interval=1),
+            scale=ScaleConfig(exponent_min=-5, exponent_max=5, learning_rate=0.2,
+                              model_area=1024.0, label_sigma=1.5),
             verification=VerificationConfig('verification')),
         'paper': paper,
         'mas': paper,

@@ -100,6 +100,9 @@ class ChannelConfig:
         `NetworkConfig.appearance_backbone` or `motion_backbone` names.
     weight : float
         Factor on the normalized channels.
+    power : float
+        Exponent on the length of each cell's feature vector: 1 keeps it, below 1 dims the cells
+        that stand out most, so that a bright neighbor does not drown the target.
     layer : str
         Layer of the network, by its own name or as `shallow` or `deep`; averaged over the cell
         of the block where its own cells are smaller.
@@ -108,12 +111,14 @@ class ChannelConfig:
 
     kind: str
     weight: float = 1.0
+    power: float = 1.0
     layer: str = ''
 
     def __post_init__(self) -> None:
         """Check the ranges."""
         check_choice(self, 'kind', ('hog', 'intensity', *NETWORK_KINDS))
         check_range(self, 'weight', 0, 100, open_low=True)
+        check_range(self, 'power', 0, 1)
         if bool(self.layer) != (self.kind in NETWORK_KINDS):
             raise ConfigError(f'ChannelConfig.layer is {self.layer!r} for kind {self.kind!r}; '
                               f'expected a layer such as shallow or deep for '

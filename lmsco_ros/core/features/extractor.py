@@ -34,7 +34,9 @@ from lmsco_ros.core.sections import ChannelConfig, FeatureConfig, NETWORK_KINDS
 if TYPE_CHECKING:
     from lmsco_ros.core.features.network_channels import NetworkChannels
 
-__all__ = ['FeatureExtractor', 'hann_window', 'normalize']
+__all__ = ['FeatureExtractor', 'compress', 'hann_window', 'normalize']
+
+_LEAST_ENERGY = 1e-6
 
 Maps = Mapping[tuple[str, int], Array]
 """Channels of a network by layer and side of the cells."""
@@ -99,13 +101,21 @@ class FeatureExtractor:
     def _series(self, block: _Block, patches: np.ndarray, maps: Mapping[str, Maps]
                 ) -> Array:
         """Return the series of one block."""
-        groups = [group.weight * normalize(self._channels(group, block.config.cell, patches, maps))
+        groups = [self._group(group, block.config.cell, patches, maps)
                   for group in block.config.channels]
         xp = array_namespace(groups[0])
         channels = groups[0] if len(groups) == 1 else xp.concat(groups, axis=-1)
         if block.projection is not None:
             channels = normalize(block.projection(channels))
         return interpolate(xp.permute_dims(channels, (1, 2, 0, 3)) * block.window, block.kernel)
+
+    def _group(self, group: ChannelConfig, cell: int, patches: np.ndarray,
+               maps: Mapping[str, Maps]) -> Array:
+        """Return a normalized group of channels, shape (n, N, N, C)."""
+        channels = self._channels(group, cell, patches, maps)
+        if group.power < 1:
+            channels = compress(channels, group.power)
+        return group.weight * normalize(channels)
 
     def _channels(self, group: ChannelConfig, cell: int, patches: np.ndarray,
                   maps: Mapping[str, Maps]) -> Array:
@@ -154,6 +164,23 @@ def _make_block(config: FeatureConfig, size: int, backend: Backend) -> _Block:
     window = backend.asarray(hann_window(cells)[:, :, None, None])
     projection = Projection(config.projection, backend) if config.projection else None
     return _Block(config, projection, window, kernel)
+
+
+def compress(channels: Array, power: float) -> Array:
+    """
+    Raise the length of each cell's feature vector to a power; zeros stay zeros.
+
+    Parameters
+    ----------
+    channels : array, shape (n, N, N, C)
+        Feature vectors.
+    power : float
+        Exponent in [0, 1].
+
+    """
+    xp = array_namespace(channels)
+    energy = xp.mean(channels**2, axis=-1, keepdims=True)
+    return channels * (energy + _LEAST_ENERGY)**((power - 1) / 2)
 
 
 def normalize(channels: Array) -> Array:
