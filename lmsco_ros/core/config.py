@@ -171,10 +171,10 @@ def _presets() -> Mapping[str, TrackerConfig]:
         'default': TrackerConfig(
             features=(FeatureConfig((
                 ChannelConfig('appearance', power=0.5, layer='features'),
-                *HANDCRAFTED[0].channels)),),
+                *HANDCRAFTED[0].channels), projection=32),),
             sampling=SamplingConfig(patch_size_min=100, patch_size_max=100),
-            learning=LearningConfig(iterations=1, gradient_steps=1, update_interval=1),
-            scale=ScaleConfig(exponent_min=-5, exponent_max=5, learning_rate=0.2,
+            learning=LearningConfig(iterations=1, gradient_steps=1, update_interval=2),
+            scale=ScaleConfig(exponent_min=-5, exponent_max=5, learning_rate=0.3,
                               model_area=1024.0, label_sigma=1.5),
             verification=VerificationConfig('verification')),
         'paper': paper,
