@@ -165,7 +165,8 @@ class NetworkConfig:
     appearance_backbone, motion_backbone : str
         Names of weights; `lmsco weights list` shows them all.
     directory : str
-        Folder of the weights that the package does not bring; empty for the user's cache.
+        Folder of weights that the package does not bring, or brings otherwise trained; empty for
+        the user's cache.
 
     """
 

@@ -96,10 +96,20 @@ def load_backbone(name: str, directory: Path | None = None) -> Backbone:
 
 
 def locate(source: WeightsSource, directory: Path | None = None) -> Path | None:
-    """Return the file that holds a set of weights, converted or as published, or None."""
-    folder = Path(__file__).parent if source.bundled else weights_directory(directory)
+    """
+    Return the file that holds a set of weights, converted or as published, or None.
+
+    Bundled weights lie in the package; those in a `directory` that is given, trained by the
+    user, go before them.
+    """
+    if source.bundled:
+        folders = [Path(__file__).parent] if directory is None else [
+            directory, Path(__file__).parent]
+    else:
+        folders = [weights_directory(directory)]
     names = (*(f'{source.name}{suffix}' for suffix in READERS), source.file_name)
-    return next((folder / name for name in names if (folder / name).is_file()), None)
+    return next((folder / name for folder in folders for name in names
+                 if (folder / name).is_file()), None)
 
 
 def find_file(source: WeightsSource, directory: Path | None = None) -> Path:
