@@ -28,7 +28,7 @@ from lmsco_ros.core.config import (
 weights = st.floats(0.01, 100)
 words = st.text(st.characters(codec='utf-8', exclude_categories=['Cc', 'Cs']), min_size=1)
 channels = st.builds(ChannelConfig, st.sampled_from(['hog', 'intensity']), weights) | st.builds(
-    ChannelConfig, st.sampled_from(['appearance', 'motion']), weights, words)
+    ChannelConfig, st.sampled_from(['appearance', 'motion']), weights, st.floats(0, 1), words)
 features = st.builds(
     FeatureConfig, st.lists(channels, min_size=1, max_size=2).map(tuple),
     cell=st.sampled_from([2, 4, 8]), projection=st.integers(0, 4096))

@@ -19,12 +19,14 @@ import numpy as np
 import pytest
 
 from lmsco_ros.core.backbones.thermal import ThermalFlowNet, ThermalNet
+from lmsco_ros.core.backend import to_numpy
 from lmsco_ros.core.config import ChannelConfig, FeatureConfig, NetworkConfig, TrackerConfig
-from lmsco_ros.core.features.extractor import FeatureExtractor, hann_window, normalize
+from lmsco_ros.core.features.extractor import (
+    compress, FeatureExtractor, hann_window, normalize)
 from lmsco_ros.core.features.hog import hog
 from lmsco_ros.core.features.intensity_channels import intensity_channels
 from lmsco_ros.core.fourier.interpolation import interpolation_series
-from lmsco_ros.core.fourier.series import analyze, mean_of_squares
+from lmsco_ros.core.fourier.series import analyze, mean_of_squares, synthesize
 from lmsco_ros.core.networks import Networks
 
 PLAIN = FeatureConfig((ChannelConfig('intensity'),), 4)
@@ -177,3 +179,30 @@ def test_configuration_of_no_network_loads_none(random_weights, monkeypatch):
     assert asked == []
     LMSCOTracker(TrackerConfig(features=BOTH, networks=NetworkConfig('thermal', 'thermal_flow')))
     assert asked == [('thermal', None), ('thermal_flow', None)]
+
+
+@pytest.mark.parametrize('power', [0.0, 0.3, 0.5, 1.0])
+def test_compression_raises_the_length_of_each_feature_vector_to_a_power(backend, rng, power):
+    channels = rng.normal(size=(2, 5, 5, 7)).astype(np.float32)
+    channels[0, 2, 3] *= 40
+    channels[1, 4, 0] = 0
+    result = to_numpy(compress(backend.asarray(channels), power))
+    length, given = (np.sqrt(np.mean(values**2, axis=-1)) for values in (result, channels))
+    shown = given > 0
+    np.testing.assert_allclose(length[shown], given[shown]**power, rtol=1e-3)
+    np.testing.assert_allclose(result[shown] / length[shown][:, None],
+                               channels[shown] / given[shown][:, None], rtol=1e-3, atol=1e-5)
+    assert not result[1, 4, 0].any()
+
+
+def test_a_bright_neighbor_takes_less_from_a_compressed_group(backend, networks, rng):
+    """What the power leaves to the other cells once one cell stands out."""
+    patch = textures(rng, 1, 40)
+    patch[0, 4:8, 4:8] += 30
+    energies = []
+    for power in (1.0, 0.5):
+        block = FeatureConfig((ChannelConfig('appearance', power=power, layer='features'),), 4)
+        series, = extractor(backend, 40, block, networks=networks)(patch)
+        values = to_numpy(synthesize(series, 9))[:, :, 0]
+        energies.append(np.mean(values[5:]**2) / np.mean(values**2))
+    assert energies[1] > 1.5 * energies[0]

@@ -25,6 +25,7 @@ from lmsco_ros.core.backbones.download import file_sha256
 from lmsco_ros.core.backbones.formats import read_arrays, write_arrays
 from lmsco_ros.core.backbones.motion_cnn import MotionCNN
 from lmsco_ros.core.backbones.squeezenet import SqueezeNet
+from lmsco_ros.core.backbones.thermal import ThermalNet
 from lmsco_ros.core.backbones.vgg_m import VGGM
 from lmsco_ros.core.backbones.weights import (
     DIRECTORY_VARIABLE, fetch_weights, import_weights, load_backbone, verify_weights,
@@ -192,6 +193,15 @@ def test_bundled_weights_are_looked_for_in_the_package(tmp_path, change_source):
     for get in (fetch_weights, lambda name: import_weights(tmp_path, name)):
         with pytest.raises(WeightsError, match='come with the package'):
             get(SQUEEZENET)
+
+
+def test_bundled_weights_give_way_to_those_that_a_user_trained(tmp_path, random_arrays):
+    arrays = random_arrays(ThermalNet)
+    write_arrays(tmp_path / 'thermal.safetensors', arrays, {})
+    own, bundled = (load_backbone('thermal', folder).state_dict()['conv1.weight'].numpy()
+                    for folder in (tmp_path, None))
+    np.testing.assert_array_equal(own, arrays['conv1.weight'])
+    assert not np.array_equal(own, bundled)
 
 
 def test_fetched_weights_are_converted(tmp_path, squeezenet, write_file, change_source,
