@@ -58,6 +58,12 @@ def peak_to_sidelobe_ratio(grid: np.ndarray, exclude: int) -> float:
     return float((grid[row, column] - mean) / deviation) if deviation > 0 else 0.0
 
 
+# Log-odds that the network gives a target like those of its training, and the part of the way
+# that the measure of another target follows in one frame.
+_USUAL_PRESENCE = 4.0
+_USUAL_RATE = 0.03
+
+
 @dataclass(frozen=True)
 class Evidence:
     """
@@ -98,6 +104,7 @@ class ConfidenceMonitor:
 
     config: ConfidenceConfig
     _first: list[float] = field(default_factory=list)
+    _usual: float = _USUAL_PRESENCE
     _reference: float | None = None
     _state: TrackState = TrackState.TRACKING
     _misses: int = 0
@@ -118,10 +125,21 @@ class ConfidenceMonitor:
             return 0.0
         return sharpness / self._reference if self._reference else 1.0
 
+    def presence(self, evidence: Evidence) -> float | None:
+        """
+        Return the log-odds of presence, as of a target that the network knows.
+
+        A target unlike those of the training, or one that slowly turns, has low odds while it is
+        followed with certainty; only what falls below that speaks against it.
+        """
+        if evidence.presence is None:
+            return None
+        return evidence.presence + max(0.0, _USUAL_PRESENCE - self._usual)
+
     def score(self, evidence: Evidence) -> float:
         """Return the probability that a frame shows the target, in [0, 1]."""
         quality = self.quality(evidence.sharpness)
-        return trust(quality, evidence.likeness, evidence.presence) if quality else 0.0
+        return trust(quality, evidence.likeness, self.presence(evidence)) if quality else 0.0
 
     def convincing(self, evidence: Evidence) -> bool:
         """
@@ -129,10 +147,11 @@ class ConfidenceMonitor:
 
         Filter, first filter and comparison must agree, each of them.
         """
+        presence = self.presence(evidence)
         return (self.score(evidence) >= self.config.found
                 and self.quality(evidence.sharpness) >= self.config.sharp
                 and evidence.likeness >= self.config.alike
-                and (evidence.presence is None or evidence.presence >= 0))
+                and (presence is None or presence >= 0))
 
     def believable(self, evidence: Evidence) -> bool:
         """Return whether a frame shows the target."""
@@ -142,7 +161,7 @@ class ConfidenceMonitor:
 
     def similar(self, evidence: Evidence) -> bool:
         """Return whether something looks like the target; the target itself may stand beside."""
-        return (trust(1.0, evidence.likeness, evidence.presence) >= self.config.uncertain
+        return (trust(1.0, evidence.likeness, self.presence(evidence)) >= self.config.uncertain
                 and evidence.likeness >= self.config.alike)
 
     def judge(self, evidence: Evidence) -> TrackState:
@@ -153,7 +172,7 @@ class ConfidenceMonitor:
         if not missed:
             self._state = (TrackState.TRACKING if score >= self._certain()
                            else TrackState.UNCERTAIN)
-            self._set_reference(evidence.sharpness)
+            self._set_reference(evidence)
         elif self._state is not TrackState.LOST:
             lost = self._misses >= self.config.lost_frames
             self._state = TrackState.LOST if lost else TrackState.UNCERTAIN
@@ -166,11 +185,13 @@ class ConfidenceMonitor:
         jumped = evidence.jump > _JUMP
         return self.score(evidence) < (self.config.uncertain if jumped else self.config.lost)
 
-    def _set_reference(self, sharpness: float) -> None:
-        """Take a frame into the reference, if it is one of the first that show something."""
-        if sharpness > 0 and len(self._first) < self.config.reference_frames:
-            self._first.append(sharpness)
+    def _set_reference(self, evidence: Evidence) -> None:
+        """Take a frame that shows the target into what later frames are measured against."""
+        if evidence.sharpness > 0 and len(self._first) < self.config.reference_frames:
+            self._first.append(evidence.sharpness)
             self._reference = float(np.median(self._first))
+        if evidence.presence is not None and self._state is TrackState.TRACKING:
+            self._usual += _USUAL_RATE * (evidence.presence - self._usual)
 
     def _certain(self) -> float:
         """Return the score from which the state is TRACKING: less for one that already is."""

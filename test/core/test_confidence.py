@@ -212,3 +212,26 @@ def test_monitors_do_not_share_what_they_saw(monitor):
     other.judge(Evidence(2.0, presence=4.0))
     assert other.quality(2.0) == pytest.approx(1)
     assert monitor.quality(10.0) == pytest.approx(1)
+
+
+def test_low_odds_of_a_target_followed_with_certainty_become_usual():
+    """A target that the network hardly knows stays TRACKING; what falls below that does not."""
+    monitor = ConfidenceMonitor(ConfidenceConfig())
+    odd = Evidence(10.0, likeness=1.0, presence=0.0)
+    before = monitor.score(odd)
+    for _ in range(120):
+        assert monitor.judge(odd) is TrackState.TRACKING
+    assert monitor.score(odd) > before
+    assert monitor.presence(odd) == pytest.approx(4.0, abs=0.2)
+    gone = Evidence(1.5, likeness=0.1, presence=-6.0)
+    for _ in range(5):
+        state = monitor.judge(gone)
+    assert state is TrackState.LOST
+    assert monitor.presence(odd) == pytest.approx(4.0, abs=0.2)
+
+
+def test_high_odds_are_no_measure_for_later_frames():
+    monitor = ConfidenceMonitor(ConfidenceConfig())
+    for _ in range(120):
+        monitor.judge(Evidence(10.0, presence=8.0))
+    assert monitor.presence(Evidence(10.0, presence=3.0)) == 3.0
