@@ -16,6 +16,8 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import cv2
 import numpy as np
 
@@ -52,73 +54,109 @@ def hog(patches: np.ndarray, cell: int, noise_energy: float = 0.3) -> np.ndarray
     ndarray, shape (n, H // cell, W // cell, 31), float32
 
     """
-    histogram = _pool(_orientation_planes(patches), cell)
-    unsigned = histogram[:, :_UNSIGNED] + histogram[:, _UNSIGNED:]
-    result = np.zeros((len(patches), HOG_CHANNELS, *histogram.shape[2:]), np.float32)
-    orientations = np.concatenate([histogram, unsigned], axis=1)
-    for i, factor in enumerate(_normalizers(unsigned, noise_energy)):
-        truncated = orientations * factor
+    histogram = _histogram(patches, cell)
+    unsigned = histogram[:_UNSIGNED] + histogram[_UNSIGNED:]
+    orientations = np.concatenate([histogram, unsigned]).reshape(_SIGNED + _UNSIGNED, -1)
+    result = np.zeros((HOG_CHANNELS, orientations.shape[1]), np.float32)
+    energies = result[_SIGNED + _UNSIGNED:]
+    for factor, energy in zip(_normalizers(unsigned, noise_energy), energies, strict=True):
+        truncated = orientations * factor.ravel()
         np.minimum(truncated, _TRUNCATION, out=truncated)
-        result[:, :_SIGNED + _UNSIGNED] += truncated
-        result[:, _SIGNED + _UNSIGNED + i] = _TEXTURE_GAIN * truncated[:, :_SIGNED].sum(axis=1)
-    result[:, :_SIGNED + _UNSIGNED] *= 0.5
-    return np.ascontiguousarray(np.moveaxis(result, 1, -1))
+        result[:_SIGNED + _UNSIGNED] += truncated
+        truncated[:_SIGNED].sum(axis=0, out=energy)
+    result[:_SIGNED + _UNSIGNED] *= 0.5
+    energies *= _TEXTURE_GAIN
+    return np.ascontiguousarray(result.T).reshape(*histogram.shape[1:], HOG_CHANNELS)
 
 
-def _orientation_planes(patches: np.ndarray) -> np.ndarray:
-    """Return the votes of each pixel, one plane per signed orientation: (n, 18, H, W)."""
+def _histogram(patches: np.ndarray, cell: int) -> np.ndarray:
+    """
+    Return the votes per signed orientation and cell, shape (18, n, H // cell, W // cell).
+
+    Each gradient votes in its row for two orientations in two columns of cells; the rows of
+    pixels then share theirs between two rows of cells.
+    """
     count, height, width = patches.shape
-    pixels = height * width
-    magnitude, angle = _gradients(patches)
-    position = angle * np.float32(_SIGNED / (2 * np.pi))
-    lower = np.minimum(position.astype(np.int32), _SIGNED - 1)
-    upper_vote = (position - lower) * magnitude
-    upper = np.where(lower == _SIGNED - 1, 0, lower + 1)
-    base = np.arange(pixels, dtype=np.int32) + (
-        np.arange(count, dtype=np.int32) * _SIGNED * pixels)[:, None]
-    base = base.reshape(patches.shape)
-    planes = np.zeros(count * _SIGNED * pixels, np.float32)
-    planes[lower * pixels + base] = magnitude - upper_vote
-    planes[upper * pixels + base] = upper_vote
-    return planes.reshape(count, _SIGNED, height, width)
+    # One orientation more than there are, and a column of cells beyond each border.
+    bins, columns = _SIGNED + 1, width // cell + 2
+    places, votes = _shared_votes(patches, cell, (bins, columns))
+    rows = np.bincount(places.ravel(), votes.ravel(), count * height * bins * columns)
+    rows = rows.astype(np.float32).reshape(count, height, bins * columns)
+    cells = (_triangles(height, cell) @ rows).reshape(count, -1, bins, columns)[..., 1:-1]
+    cells[:, :, 0] += cells[:, :, _SIGNED]
+    return np.ascontiguousarray(cells[:, :, :_SIGNED].transpose(2, 0, 1, 3))
 
 
-def _gradients(patches: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return magnitude and direction of the central differences, one-sided at the border."""
-    padded = np.pad(patches, ((0, 0), (1, 1), (1, 1)), mode='edge')
-    dx = padded[:, 1:-1, 2:] - padded[:, 1:-1, :-2]
-    dy = padded[:, 2:, 1:-1] - padded[:, :-2, 1:-1]
-    width = patches.shape[-1]
-    magnitude, angle = cv2.cartToPolar(dx.reshape(-1, width), dy.reshape(-1, width))
-    return magnitude.reshape(patches.shape), angle.reshape(patches.shape)
+def _shared_votes(patches: np.ndarray, cell: int,
+                  shape: tuple[int, int]) -> tuple[np.ndarray, np.ndarray]:
+    """Return the four votes of each pixel, and their places in (n * H, *shape), flat."""
+    magnitude, lower, upper_vote = _votes(patches)
+    left, right_share = _columns(patches.shape[2], cell)
+    row = np.arange(len(lower), dtype=np.int32)[:, None] * (shape[0] * shape[1])
+    places, votes = np.empty((4, *lower.shape), np.intp), np.empty((4, *lower.shape))
+    np.add(lower * shape[1], row + left, out=places[0])
+    np.add(places[0], shape[1], out=places[1])
+    np.add(places[:2], 1, out=places[2:])
+    np.subtract(magnitude, upper_vote, out=votes[0])
+    votes[1] = upper_vote
+    np.multiply(votes[:2], right_share, out=votes[2:])
+    votes[:2] -= votes[2:]
+    return places, votes
 
 
-def _pool(planes: np.ndarray, cell: int) -> np.ndarray:
-    """Return the votes per cell, linear in both directions: (n, 18, H // cell, W // cell)."""
-    count, bins, height, width = planes.shape
-    position = (np.arange(cell) + 0.5) / cell - 0.5
-    triangle = np.maximum(0, 1 - np.abs(np.arange(-1, 2)[:, None] - position[None, :]))
-    triangle = triangle.astype(np.float32)
-    rows = triangle @ planes.reshape(count * bins, height // cell, cell, width)
-    rows = _overlap(rows.transpose(1, 2, 0, 3)).transpose(1, 0, 2)
-    columns = rows.reshape(-1, cell) @ triangle.T
-    columns = columns.reshape(-1, width // cell, 3)
-    pooled = np.ascontiguousarray(_overlap(columns.transpose(1, 2, 0)).T)
-    return pooled.reshape(count, bins, height // cell, width // cell)
+def _votes(patches: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """
+    Return how strongly each pixel votes, and for what, each of shape (n * H, W).
+
+    Returns
+    -------
+    magnitude : ndarray, float32
+        The whole vote.
+    lower : ndarray, int32
+        First of the two signed orientations, 0..17, between which it is shared.
+    upper_vote : ndarray, float32
+        Share of the second one, which behind the last is the first.
+
+    """
+    magnitude, angle = cv2.cartToPolar(*(
+        _differences(patches, axis).reshape(-1, patches.shape[2]) for axis in (2, 1)))
+    angle *= np.float32(_SIGNED / (2 * np.pi))
+    lower = np.minimum(angle.astype(np.int32), _SIGNED - 1)
+    angle -= lower
+    angle *= magnitude
+    return magnitude, lower, angle
 
 
-def _overlap(parts: np.ndarray) -> np.ndarray:
-    """Add what each cell, along axis 0, gives to its neighbors before and behind (axis 1)."""
-    total = parts[:, 1].copy()
-    total[1:] += parts[:-1, 2]
-    total[:-1] += parts[1:, 0]
-    return total
+def _differences(patches: np.ndarray, axis: int) -> np.ndarray:
+    """Return the central differences along an axis, one-sided at the border."""
+    result = np.empty_like(patches)
+    pixels, differences = np.moveaxis(patches, axis, 0), np.moveaxis(result, axis, 0)
+    np.subtract(pixels[2:], pixels[:-2], out=differences[1:-1])
+    np.subtract(pixels[1], pixels[0], out=differences[0])
+    np.subtract(pixels[-1], pixels[-2], out=differences[-1])
+    return result
+
+
+@lru_cache(maxsize=16)
+def _columns(width: int, cell: int) -> tuple[np.ndarray, np.ndarray]:
+    """Return the left one of each pixel's two cells, the first being 0, and the right's share."""
+    position = (np.arange(width) + 0.5) / cell + 0.5
+    left = position.astype(np.int32)
+    return left, position - left
+
+
+@lru_cache(maxsize=16)
+def _triangles(height: int, cell: int) -> np.ndarray:
+    """Return the share of each pixel in each cell, linear, shape (H // cell, H)."""
+    position = (np.arange(height) + 0.5) / cell - 0.5
+    share = np.maximum(0, 1 - np.abs(np.arange(height // cell)[:, None] - position))
+    return share.astype(np.float32)
 
 
 def _normalizers(unsigned: np.ndarray, noise_energy: float) -> list[np.ndarray]:
-    """Return, for each of the four blocks around a cell, one over its norm, (n, 1, ...)."""
-    energy = (unsigned**2).sum(axis=1, keepdims=True)
-    energy = np.pad(energy, ((0, 0), (0, 0), (1, 1), (1, 1)), mode='edge')
-    pairs = energy[:, :, 1:] + energy[:, :, :-1]
+    """Return, for each of the four blocks around a cell, one over its norm, (n, ...)."""
+    rows, columns = (np.arange(-1, size + 1).clip(0, size - 1) for size in unsigned.shape[2:])
+    energy = (unsigned**2).sum(axis=0)[:, rows[:, None], columns]
+    pairs = energy[:, 1:] + energy[:, :-1]
     blocks = 1 / np.sqrt(pairs[..., 1:] + pairs[..., :-1] + np.float32(noise_energy))
     return [blocks[..., 1:, 1:], blocks[..., :-1, 1:], blocks[..., 1:, :-1], blocks[..., :-1, :-1]]
