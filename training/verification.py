@@ -46,7 +46,7 @@ class VerificationObjective:
     def _answer(network: VerificationNet, batch: Batch) -> torch.Tensor:
         """Return what the network says of the second patch of each example."""
         encodings = network(batch.inputs.flatten(0, 1))[0].unflatten(0, batch.inputs.shape[:2])
-        return network.compare(encodings[:, 0], encodings[:, 1])
+        return network.compare(network.reference(encodings[:, 0]), encodings[:, 1])
 
 
 def verification_batches(source: PairSource, size: int, shares: Mapping[str, float],

@@ -44,11 +44,11 @@ class Verification:
 
     def __init__(self, network: VerificationNet, view: FrameView, box: BoundingBox) -> None:
         self._network = network
-        self._first = self._encode(view, box)
+        self._reference = network.reference(self._encode(view, box))
 
     def __call__(self, view: FrameView, box: BoundingBox) -> float:
         """Return the log-odds that a box shows the target of the first frame."""
-        return self._network.relate(self._first, self._encode(view, box))
+        return self._network.relate(self._reference, self._encode(view, box))
 
     def _encode(self, view: FrameView, box: BoundingBox) -> object:
         """Return the encoding of the region around a box."""

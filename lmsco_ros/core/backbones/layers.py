@@ -117,5 +117,7 @@ def fold_gray(weight: np.ndarray, bias: np.ndarray, mean: np.ndarray,
 
 def standardize(images: torch.Tensor) -> torch.Tensor:
     """Return one-channel images (n, 1, H, W) with zero mean and about unit contrast."""
-    deviation, mean = torch.std_mean(images, dim=(2, 3), keepdim=True)
-    return (images - mean) / (deviation + _CONTRAST_FLOOR)
+    centered = images - images.mean(dim=(2, 3), keepdim=True)
+    pixels = images.shape[2] * images.shape[3]
+    variance = centered.square().sum(dim=(2, 3), keepdim=True) / (pixels - 1)
+    return centered / (variance.sqrt() + _CONTRAST_FLOOR)

@@ -71,18 +71,33 @@ class VerificationNet(Backbone):
         return self(torch.from_numpy(patch)[None, None].to(self.answer.weight.device))[0]
 
     @torch.inference_mode()
-    def relate(self, first: torch.Tensor, now: torch.Tensor) -> float:
-        """Return the answer of `compare` for one pair of encodings."""
-        return float(self.compare(first, now)[0])
+    def relate(self, reference: torch.Tensor, now: torch.Tensor) -> float:
+        """Return the answer of `compare` for one encoding."""
+        return float(self.compare(reference, now)[0])
 
-    def compare(self, first: torch.Tensor, now: torch.Tensor) -> torch.Tensor:
+    def reference(self, first: torch.Tensor) -> torch.Tensor:
         """
-        Return the log-odds that the second patch shows the target.
+        Return what a target adds to every comparison with it.
 
         Parameters
         ----------
-        first, now : tensor, shape (n, 48, 8, 8)
-            Encodings of the target in the first frame, and of the patches.
+        first : tensor, shape (n, 48, 8, 8)
+            Encodings of the target in the first frame.
+
+        """
+        kernels = self.joint1.weight[:, :first.shape[1]]
+        return torch.nn.functional.conv2d(first, kernels, self.joint1.bias, padding=1)
+
+    def compare(self, reference: torch.Tensor, now: torch.Tensor) -> torch.Tensor:
+        """
+        Return the log-odds that a patch shows the target.
+
+        Parameters
+        ----------
+        reference : tensor, shape (n, 64, 8, 8)
+            What `reference` makes of the target.
+        now : tensor, shape (n, 48, 8, 8)
+            Encodings of the patches.
 
         Returns
         -------
@@ -90,6 +105,7 @@ class VerificationNet(Backbone):
             Log-odds.
 
         """
-        maps = torch.relu_(self.joint1(torch.cat([first, now], dim=1)))
+        kernels = self.joint1.weight[:, -now.shape[1]:]
+        maps = torch.relu_(reference + torch.nn.functional.conv2d(now, kernels, padding=1))
         maps = torch.relu_(self.joint2(maps))
         return self.answer(torch.relu_(self.hidden(maps.flatten(1))))[:, 0]
