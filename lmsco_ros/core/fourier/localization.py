@@ -17,6 +17,8 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
+import math
 
 import numpy as np
 
@@ -24,6 +26,9 @@ from lmsco_ros.core.backend import Array, to_numpy
 from lmsco_ros.core.fourier.series import bandwidth, grid_size, half_weights, synthesize
 
 __all__ = ['Peak', 'centered_map', 'locate', 'refine']
+
+# In periods; the next step of Newton's method would be about the square of it.
+_SMALLEST_STEP = 1e-7
 
 
 @dataclass(frozen=True)
@@ -92,8 +97,8 @@ def refine(series: np.ndarray, start: tuple[float, float],
     start : tuple of float
         (ty, tx) in periods.
     steps : int
-        Newton steps, each at most half a point of the grid that carries the series. Where the
-        function is not concave, its curvature counts as if it were.
+        Newton steps at most, each at most half a point of the grid that carries the series.
+        Where the function is not concave, its curvature counts as if it were.
 
     Returns
     -------
@@ -103,40 +108,47 @@ def refine(series: np.ndarray, start: tuple[float, float],
     """
     order = bandwidth(series)
     weighted = series.astype(np.complex128) * half_weights(series)
-    ky = 2j * np.pi * np.arange(-order, order + 1)
-    kx = 2j * np.pi * np.arange(order + 1)
-    position = start
-    first = _value(weighted, ky, kx, start)
+    position, derivatives = start, _derivatives(weighted, start)
+    first = derivatives[0, 0]
     for _ in range(steps):
-        step = _ascent(*_derivatives(weighted, ky, kx, position))
-        step *= min(1.0, 0.5 / (grid_size(order) * max(float(np.hypot(*step)), 1e-12)))
-        position = (position[0] + float(step[0]), position[1] + float(step[1]))
-    value = _value(weighted, ky, kx, position)
-    return (position, value) if value >= first else (start, first)
+        step = _ascent(derivatives)
+        length = math.hypot(*step)
+        part = min(1.0, 0.5 / (grid_size(order) * max(length, 1e-12)))
+        position = (position[0] + part * step[0], position[1] + part * step[1])
+        derivatives = _derivatives(weighted, position)
+        if length < _SMALLEST_STEP:
+            break
+    value = derivatives[0, 0]
+    return (position, float(value)) if value >= first else (start, float(first))
 
 
-def _ascent(gradient: np.ndarray, hessian: np.ndarray) -> np.ndarray:
+def _ascent(derivatives: np.ndarray) -> tuple[float, float]:
     """Return the Newton step uphill: gradient over the absolute curvatures."""
-    curvatures, directions = np.linalg.eigh(hessian)
-    bounded = np.maximum(np.abs(curvatures), 1e-12 * np.abs(curvatures).max() + 1e-300)
-    return directions @ ((directions.T @ gradient) / bounded)
+    gradient = float(derivatives[1, 0]), float(derivatives[0, 1])
+    yy, xx, yx = float(derivatives[2, 0]), float(derivatives[0, 2]), float(derivatives[1, 1])
+    mean, half = (yy + xx) / 2, (yy - xx) / 2
+    radius = math.hypot(half, yx)
+    least = 1e-12 * (abs(mean) + radius) + 1e-300
+    high, low = (1 / max(abs(curvature), least) for curvature in (mean + radius, mean - radius))
+    # The inverse of the absolute Hessian is linear in the Hessian.
+    same, slope = (high + low) / 2, (high - low) / (2 * radius) if radius > 0 else 0.0
+    return (same * gradient[0] + slope * (half * gradient[0] + yx * gradient[1]),
+            same * gradient[1] + slope * (yx * gradient[0] - half * gradient[1]))
 
 
-def _value(weighted: np.ndarray, ky: np.ndarray, kx: np.ndarray,
-           position: tuple[float, float]) -> float:
-    """Return the function value at `position`."""
-    return float((np.exp(ky * position[0]) @ weighted @ np.exp(kx * position[1])).real)
+def _derivatives(weighted: np.ndarray, position: tuple[float, float]) -> np.ndarray:
+    """Return the derivatives at `position`, [i, j] being the i-th in y and the j-th in x."""
+    order = bandwidth(weighted)
+    rows, columns = _powers(-order, order), _powers(0, order)
+    left = rows * np.exp(rows[1] * position[0])
+    right = columns * np.exp(columns[1] * position[1])
+    return (left @ weighted @ right.T).real
 
 
-def _derivatives(weighted: np.ndarray, ky: np.ndarray, kx: np.ndarray,
-                 position: tuple[float, float]) -> tuple[np.ndarray, np.ndarray]:
-    """Return gradient (2,) and Hessian (2, 2) at `position`."""
-    rows = np.exp(ky * position[0])
-    columns = np.exp(kx * position[1])
-    left = np.stack([rows, ky * rows, ky**2 * rows])
-    right = np.stack([columns, kx * columns, kx**2 * columns])
-    d = (left @ weighted @ right.T).real
-    return (np.array([d[1, 0], d[0, 1]]), np.array([[d[2, 0], d[1, 1]], [d[1, 1], d[0, 2]]]))
+@lru_cache(maxsize=16)
+def _powers(first: int, last: int) -> np.ndarray:
+    """Return (2 pi i k)^p for p = 0, 1, 2 and the frequencies k from first to last."""
+    return (2j * np.pi * np.arange(first, last + 1))**np.arange(3)[:, None]
 
 
 def centered_map(grid: np.ndarray) -> np.ndarray:
