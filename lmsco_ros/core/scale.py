@@ -19,7 +19,7 @@ from __future__ import annotations
 import math
 from typing import Protocol
 
-import cv2
+from array_api_compat.numpy import vecdot
 import numpy as np
 import scipy.fft
 
@@ -122,13 +122,19 @@ class ScaleFilter(FixedScale):
 
     def __init__(self, config: ScaleConfig, size: tuple[float, float]) -> None:
         self._config = config
-        self._factors = np.array(scale_factors(config))
-        count = len(self._factors)
+        factors = np.array(scale_factors(config))
         offsets = np.arange(config.exponent_min, config.exponent_max + 1)
         label = np.exp(-0.5 * (offsets / config.label_sigma)**2)
         self._label = scipy.fft.rfft(label.astype(np.float32))
-        self._window = np.hanning(count + 2)[1:-1].astype(np.float32)
+        window = np.hanning(len(factors) + 2)[1:-1].astype(np.float32)
+        self._transform = scipy.fft.rfft(np.diag(window), axis=0)
         self._model = _model_size(size, config.model_area)
+        self._largest = config.padding * float(factors[-1])
+        self._pixels = tuple(math.ceil(side * factors[-1]) for side in self._model)
+        columns, rows = (
+            np.stack([_zoom(length, factor / factors[-1], side) for factor in factors])
+            for length, side in zip(self._pixels, self._model, strict=True))
+        self._rows, self._columns = rows.reshape(-1, rows.shape[2]), columns.transpose(0, 2, 1)
         self._learned = False
         self._numerator = np.zeros(1, np.complex64)
         self._denominator = np.zeros(1, np.float32)
@@ -136,8 +142,8 @@ class ScaleFilter(FixedScale):
     def learn(self, view: FrameView, box: BoundingBox) -> None:
         """Average the sample around `box` into the filter."""
         spectrum = self._sample(view, box)
-        numerator = np.conj(spectrum) * self._label[:, None]
-        denominator = np.mean(np.abs(spectrum)**2, axis=1)
+        numerator = spectrum * np.conj(self._label)[:, None]
+        denominator = vecdot(spectrum, spectrum).real / spectrum.shape[1]
         rate = np.float32(self._config.learning_rate if self._learned else 1.0)
         self._numerator = self._numerator + rate * (numerator - self._numerator)
         self._denominator = self._denominator + rate * (denominator - self._denominator)
@@ -146,28 +152,31 @@ class ScaleFilter(FixedScale):
     def estimate(self, view: FrameView, box: BoundingBox) -> float:
         """Return the factor at the maximum of the response."""
         spectrum = self._sample(view, box)
-        response = np.mean(self._numerator * spectrum, axis=1)
+        response = vecdot(self._numerator, spectrum) / spectrum.shape[1]
         response /= self._denominator + np.float32(self._config.regularization)
-        return _best_factor(self._config, scipy.fft.irfft(response, len(self._factors)))
+        return _best_factor(self._config, scipy.fft.irfft(response, len(self._columns)))
 
     def _sample(self, view: FrameView, box: BoundingBox) -> np.ndarray:
-        """Return the spectrum over scale of the features, shape (n // 2 + 1, d)."""
-        features = self._features(view, box)
-        return scipy.fft.rfft(features * self._window[:, None], axis=0)
+        """Return the spectrum over scale of the windowed features, shape (n // 2 + 1, d)."""
+        return self._transform @ self._features(view, box)
 
     def _features(self, view: FrameView, box: BoundingBox) -> np.ndarray:
         """Return one feature vector per scale: HOG and normalized intensity, shape (n, d)."""
-        largest = self._config.padding * float(self._factors[-1])
-        width, height = (math.ceil(side * self._factors[-1]) for side in self._model)
-        region = BoundingBox.from_center(box.center, (largest * box.width, largest * box.height))
-        pixels = view.patch(region, (width, height))
-        patches = np.stack([_zoom(pixels, float(factor / self._factors[-1]), self._model)
-                            for factor in self._factors])
-        gray = patches - patches.mean(axis=(1, 2), keepdims=True)
-        gray /= np.sqrt((gray**2).mean(axis=(1, 2), keepdims=True)) + np.float32(1e-6)
+        patches = self._patches(view, box)
         count = len(patches)
+        gray = patches.reshape(count, -1)
+        gray = gray - gray.mean(axis=1, keepdims=True)
+        deviation = np.sqrt(vecdot(gray, gray) / gray.shape[1]) + np.float32(1e-6)
+        gray = gray.reshape(patches.shape)[:, ::2, ::2].reshape(count, -1)
         return np.concatenate([hog(patches, _CELL).reshape(count, -1),
-                               0.1 * gray[:, ::2, ::2].reshape(count, -1)], axis=1)
+                               gray * (np.float32(0.1) / deviation[:, None])], axis=1)
+
+    def _patches(self, view: FrameView, box: BoundingBox) -> np.ndarray:
+        """Return the target at every scale, in the size of the model."""
+        region = BoundingBox.from_center(
+            box.center, (self._largest * box.width, self._largest * box.height))
+        rows = self._rows @ view.patch(region, self._pixels)
+        return rows.reshape(len(self._columns), self._model[1], -1) @ self._columns
 
 
 def _model_size(size: tuple[float, float], area: float) -> tuple[int, int]:
@@ -177,14 +186,12 @@ def _model_size(size: tuple[float, float], area: float) -> tuple[int, int]:
     return width, height
 
 
-def _zoom(pixels: np.ndarray, part: float, size: tuple[int, int]) -> np.ndarray:
-    """Return the middle `part` of the pixels, resampled to `size` (width, height)."""
-    step = part * pixels.shape[1] / size[0], part * pixels.shape[0] / size[1]
-    start = ((1 - part) * pixels.shape[1] + step[0] - 1) / 2, (
-        (1 - part) * pixels.shape[0] + step[1] - 1) / 2
-    inverse = np.array([[step[0], 0, start[0]], [0, step[1], start[1]]])
-    return cv2.warpAffine(pixels, inverse, size, flags=cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP,
-                          borderMode=cv2.BORDER_REPLICATE)
+def _zoom(length: int, part: float, size: int) -> np.ndarray:
+    """Return the linear interpolation from `length` pixels to `size` in their middle `part`."""
+    step = part * length / size
+    places = ((1 - part) * length + step - 1) / 2 + step * np.arange(size)
+    inside = places.clip(0, length - 1)[:, None]
+    return np.maximum(0, 1 - np.abs(inside - np.arange(length))).astype(np.float32)
 
 
 def _best_factor(config: ScaleConfig, values: np.ndarray) -> float:
