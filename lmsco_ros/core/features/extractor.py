@@ -115,7 +115,7 @@ class FeatureExtractor:
         channels = self._channels(group, cell, patches, maps)
         if group.power < 1:
             channels = compress(channels, group.power)
-        return group.weight * normalize(channels)
+        return normalize(channels, group.weight)
 
     def _channels(self, group: ChannelConfig, cell: int, patches: np.ndarray,
                   maps: Mapping[str, Maps]) -> Array:
@@ -179,15 +179,17 @@ def compress(channels: Array, power: float) -> Array:
 
     """
     xp = array_namespace(channels)
-    energy = xp.mean(channels**2, axis=-1, keepdims=True)
+    energy = xp.vecdot(channels, channels)[..., None] / channels.shape[-1]
     return channels * (energy + _LEAST_ENERGY)**((power - 1) / 2)
 
 
-def normalize(channels: Array) -> Array:
-    """Return the channels (n, ..., C) of each sample with a mean square of 1; zeros stay."""
+def normalize(channels: Array, weight: float = 1.0) -> Array:
+    """Return the channels (n, ..., C) of samples, root mean square `weight`; zeros stay."""
     xp = array_namespace(channels)
-    energy = xp.mean(channels**2, axis=tuple(range(1, channels.ndim)), keepdims=True)
-    return channels * xp.where(energy > 0, 1 / xp.sqrt(xp.where(energy > 0, energy, 1.0)), 0.0)
+    rows = xp.reshape(channels, (channels.shape[0], -1))
+    energy = xp.vecdot(rows, rows) / rows.shape[1]
+    factor = xp.where(energy > 0, weight / xp.sqrt(xp.where(energy > 0, energy, 1.0)), 0.0)
+    return channels * xp.reshape(factor, (-1,) + (1,) * (channels.ndim - 1))
 
 
 def hann_window(size: int) -> np.ndarray:
