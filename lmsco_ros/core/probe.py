@@ -132,9 +132,11 @@ def without_dead_pixels(pixels: np.ndarray, spread: float) -> np.ndarray:
 
     """
     values = _finite(pixels) if pixels.dtype == np.float32 else pixels
-    median = cv2.medianBlur(np.ascontiguousarray(values), 3)
+    median = cv2.medianBlur(values, 3)
+    if cv2.norm(values, median, cv2.NORM_INF) <= spread:
+        return pixels
     dead = cv2.absdiff(values, median) > spread
-    return np.where(dead & np.isfinite(pixels), median, pixels) if dead.any() else pixels
+    return np.where(dead & np.isfinite(pixels), median, pixels)
 
 
 def is_frozen(previous: np.ndarray, probe: np.ndarray) -> bool:
@@ -211,11 +213,9 @@ def _neighbors(image: np.ndarray, shape: tuple[int, ...], down: int, right: int)
 
 def _finite(pixels: np.ndarray) -> np.ndarray:
     """Return float32 pixels with the middle of the others in place of those without a value."""
-    values = pixels.astype(np.float32)
-    missing = ~np.isfinite(values)
-    if missing.any():
-        values[missing] = np.median(values[~missing])
-    return values
+    values = pixels.astype(np.float32, copy=False)
+    finite = np.isfinite(values)
+    return values if finite.all() else np.where(finite, values, np.median(values[finite]))
 
 
 def _pattern(probe: np.ndarray, low: float, high: float) -> np.ndarray | None:

@@ -60,8 +60,8 @@ def hog(patches: np.ndarray, cell: int, noise_energy: float = 0.3) -> np.ndarray
     result = np.zeros((HOG_CHANNELS, orientations.shape[1]), np.float32)
     energies = result[_SIGNED + _UNSIGNED:]
     for factor, energy in zip(_normalizers(unsigned, noise_energy), energies, strict=True):
-        truncated = orientations * factor.ravel()
-        np.minimum(truncated, _TRUNCATION, out=truncated)
+        _, truncated = cv2.threshold(
+            orientations * factor.ravel(), _TRUNCATION, 0, cv2.THRESH_TRUNC)
         result[:_SIGNED + _UNSIGNED] += truncated
         truncated[:_SIGNED].sum(axis=0, out=energy)
     result[:_SIGNED + _UNSIGNED] *= 0.5
