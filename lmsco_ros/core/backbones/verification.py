@@ -23,7 +23,7 @@ import torch
 from torch import nn
 
 from lmsco_ros.core.backbones.backbone import Backbone, Layer
-from lmsco_ros.core.backbones.layers import standardize
+from lmsco_ros.core.backbones.layers import convolve, standardize
 
 __all__ = ['VerificationNet']
 
@@ -107,5 +107,5 @@ class VerificationNet(Backbone):
         """
         kernels = self.joint1.weight[:, -now.shape[1]:]
         maps = torch.relu_(reference + torch.nn.functional.conv2d(now, kernels, padding=1))
-        maps = torch.relu_(self.joint2(maps))
+        maps = torch.relu_(convolve(maps, self.joint2))
         return self.answer(torch.relu_(self.hidden(maps.flatten(1))))[:, 0]

@@ -21,7 +21,8 @@ import numpy as np
 import pytest
 import torch
 
-from lmsco_ros.core.backbones.layers import fold_gray, fold_mean, LocalResponseNorm
+from lmsco_ros.core.backbones.layers import (
+    convolve, fold_gray, fold_mean, LocalResponseNorm, standardize)
 from lmsco_ros.core.backbones.motion_cnn import MotionCNN
 from lmsco_ros.core.backbones.squeezenet import SqueezeNet
 from lmsco_ros.core.backbones.vgg_m import VGGM
@@ -137,6 +138,22 @@ def test_cells_lie_where_the_layers_say(architecture, rng, random_arrays):
                 stride *= first[1]
         layer = network.layers[name]
         assert (layer.stride, layer.stride / 2 + layer.offset) == (stride, middle)
+
+
+@pytest.mark.parametrize('side, stride, padding', [(4, 2, 1), (3, 1, 1), (5, 3, 0), (1, 1, 0)])
+def test_product_of_matrices_is_the_convolution(side, stride, padding):
+    torch.manual_seed(4)
+    layer = torch.nn.Conv2d(6, 5, side, stride, padding)
+    maps = torch.randn(2, 6, 9, 11)
+    torch.testing.assert_close(convolve(maps, layer), layer(maps), rtol=1e-4, atol=1e-5)
+
+
+def test_standardized_images_have_no_mean_and_known_contrast(rng):
+    images = torch.from_numpy(rng.uniform(5, 9, (3, 1, 20, 30)).astype(np.float32))
+    deviation = images.std(dim=(2, 3))
+    found = standardize(images)
+    torch.testing.assert_close(found.mean(dim=(2, 3)), torch.zeros(3, 1), rtol=0, atol=1e-5)
+    torch.testing.assert_close(found.std(dim=(2, 3)), deviation / (deviation + 0.02))
 
 
 @pytest.mark.parametrize('architecture', NETWORKS)
