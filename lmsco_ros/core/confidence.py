@@ -49,11 +49,11 @@ def peak_to_sidelobe_ratio(grid: np.ndarray, exclude: int) -> float:
     size = grid.shape[0]
     row, column = np.unravel_index(np.argmax(grid), grid.shape)
     around = np.arange(-exclude, exclude + 1)
-    square = grid[np.ix_((row + around) % size, (column + around) % size)]
-    count = grid.size - square.size
-    mean = (grid.sum(dtype=np.float64) - square.sum(dtype=np.float64)) / count
-    power = (np.square(grid).sum(dtype=np.float64)
-             - np.square(square).sum(dtype=np.float64)) / count
+    values = grid.astype(np.float64)
+    square = values[((row + around) % size)[:, None], (column + around) % size]
+    count = values.size - square.size
+    mean = (values.sum() - square.sum()) / count
+    power = (np.vdot(values, values) - np.vdot(square, square)) / count
     deviation = math.sqrt(max(power - mean**2, 0.0))
     return float((grid[row, column] - mean) / deviation) if deviation > 0 else 0.0
 

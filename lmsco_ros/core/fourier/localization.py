@@ -23,7 +23,7 @@ import math
 import numpy as np
 
 from lmsco_ros.core.backend import Array, to_numpy
-from lmsco_ros.core.fourier.series import bandwidth, grid_size, half_weights, synthesize
+from lmsco_ros.core.fourier.series import bandwidth, grid_size, synthesize
 
 __all__ = ['Peak', 'centered_map', 'locate', 'refine']
 
@@ -107,7 +107,8 @@ def refine(series: np.ndarray, start: tuple[float, float],
 
     """
     order = bandwidth(series)
-    weighted = series.astype(np.complex128) * half_weights(series)
+    weighted = series.astype(np.complex128)
+    weighted[:, 1:] *= 2
     position, derivatives = start, _derivatives(weighted, start)
     first = derivatives[0, 0]
     for _ in range(steps):
