@@ -192,6 +192,18 @@ def test_dead_pixels_become_the_median_around_them(rng, dtype):
     np.testing.assert_array_equal(without_dead_pixels(image, 60), expected)
 
 
+@given(seed=st.integers(0, 2**32 - 1), height=st.integers(1, 6), width=st.integers(1, 6),
+       levels=st.sampled_from([2, 12, 200]), spread=st.integers(0, 12))
+def test_every_dead_pixel_is_filled_in_whatever_its_place(seed, height, width, levels, spread):
+    rng = np.random.default_rng(seed)
+    image = rng.integers(0, levels, (height, width)).astype(np.uint16)
+    extended = np.pad(image, 1, mode='edge')
+    around = np.lib.stride_tricks.sliding_window_view(extended, (3, 3)).reshape(*image.shape, 9)
+    median = np.median(around, axis=-1)
+    expected = np.where(np.abs(image - median) > spread, median, image)
+    np.testing.assert_array_equal(without_dead_pixels(image, spread), expected)
+
+
 def test_a_living_picture_stays_as_it_is():
     image = scene(shape=(40, 50)).astype(np.float32)
     image[10:13, 20:23] += 2000
