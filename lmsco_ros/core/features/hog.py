@@ -80,8 +80,8 @@ def _histogram(patches: np.ndarray, cell: int) -> np.ndarray:
     # One orientation more than there are, and a column of cells beyond each border.
     bins, columns = _SIGNED + 1, width // cell + 2
     places, votes = _shared_votes(patches, cell, (bins, columns))
-    rows = np.bincount(places.ravel(), votes.ravel(), count * height * bins * columns)
-    rows = rows.astype(np.float32).reshape(count, height, bins * columns)
+    total = np.bincount(places.ravel(), votes.ravel(), count * height * bins * columns)
+    rows = total.astype(np.float32).reshape(count, height, bins * columns)
     cells = (_triangles(height, cell) @ rows).reshape(count, -1, bins, columns)[..., 1:-1]
     cells[:, :, 0] += cells[:, :, _SIGNED]
     return np.ascontiguousarray(cells[:, :, :_SIGNED].transpose(2, 0, 1, 3))
@@ -118,13 +118,13 @@ def _votes(patches: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         Share of the second one, which behind the last is the first.
 
     """
-    magnitude, angle = cv2.cartToPolar(*(
-        _differences(patches, axis).reshape(-1, patches.shape[2]) for axis in (2, 1)))
+    dx, dy = (_differences(patches, axis).reshape(-1, patches.shape[2]) for axis in (2, 1))
+    magnitude, angle = cv2.cartToPolar(dx, dy)
     angle *= np.float32(_SIGNED / (2 * np.pi))
-    lower = np.minimum(angle.astype(np.int32), _SIGNED - 1)
+    lower = np.minimum(np.floor(angle), _SIGNED - 1)
     angle -= lower
     angle *= magnitude
-    return magnitude, lower, angle
+    return magnitude, lower.astype(np.int32), angle
 
 
 def _differences(patches: np.ndarray, axis: int) -> np.ndarray:
