@@ -14,6 +14,9 @@
 
 """The tracker as its users see it: what it takes, what it gives, what it refuses."""
 
+import gc
+import weakref
+
 from hypothesis import given, settings, strategies as st
 import numpy as np
 import pytest
@@ -310,3 +313,20 @@ def test_every_way_of_learning_tracks(scene, learning):
         confidence=ConfidenceConfig(tiles=0))
     last = walk(scene, 9, config)[-1]
     assert last.box.overlap(box_of((CENTER[0] + 8, CENTER[1]))) > 0.75
+
+
+@pytest.mark.parametrize('preset', ['default', 'hcs'])
+def test_former_target_is_freed_without_the_garbage_collector(scene, preset):
+    # Tens of megabytes that would wait for a collection, which pauses and rarely comes.
+    tracker = LMSCOTracker(TrackerConfig.preset(preset))
+    gc.disable()
+    try:
+        tracker.initialize(later(scene, 0), box_of())
+        # A frame without the target and one with it: everything is looked at once.
+        tracker.update(scene.frame((-50, -50)))
+        tracker.update(later(scene))
+        former = weakref.ref(tracker._track)
+        tracker.initialize(later(scene, 2), box_of())
+        assert former() is None
+    finally:
+        gc.enable()
