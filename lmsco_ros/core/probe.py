@@ -214,7 +214,7 @@ def _finite(pixels: np.ndarray) -> np.ndarray:
     values = pixels.astype(np.float32)
     missing = ~np.isfinite(values)
     if missing.any():
-        values[missing] = np.median(values[~missing])
+        values[missing] = 0 if missing.all() else np.median(values[~missing])
     return values
 
 

@@ -202,6 +202,42 @@ def test_frame_without_a_value_is_refused_and_the_target_is_kept(scene, tracker)
     assert tracker.update(image + np.float32(1)).box.overlap(box_of()) > 0.9
 
 
+def rows_of_noise(image):
+    image[:4] = np.random.default_rng(1).uniform(-3e38, 3e38, image[:4].shape)
+
+
+def far_numbers(image):
+    image[5::9, 3::11], image[7::9, 5::11] = 3e38, -3e38
+
+
+def half(image):
+    image[:, :image.shape[1] // 2] = 3e38
+
+
+@pytest.mark.filterwarnings('error')
+@pytest.mark.parametrize('spoil', [rows_of_noise, far_numbers, half])
+def test_numbers_that_no_camera_measures_count_as_none(scene, tracker, spoil):
+    first, image, spoiled = (scene.render(CENTER).astype(np.float32) + n for n in range(3))
+    spoil(spoiled)
+    tracker.initialize(first, box_of())
+    with np.errstate(over='raise', invalid='raise', divide='raise'):
+        result = tracker.update(spoiled)
+    assert np.isfinite(result.confidence_map).all() and 0 <= result.score <= 1
+    after = tracker.update(image)
+    assert after.box.overlap(box_of()) > 0.9 and after.state is TrackState.TRACKING
+
+
+@pytest.mark.filterwarnings('error')
+def test_frame_of_numbers_that_no_camera_measures_is_refused(scene, tracker):
+    image = scene.render(CENTER).astype(np.float32)
+    tracker.initialize(image, box_of())
+    noise = np.random.default_rng(1).uniform(-3e38, 3e38, image.shape).astype(np.float32)
+    for nonsense in (np.full_like(image, 3e38), np.where(noise > 0, 3e38, -3e38), noise):
+        with pytest.raises(ImageError, match='no finite pixel'):
+            tracker.update(nonsense.astype(np.float32))
+    assert tracker.update(image + np.float32(1)).box.overlap(box_of()) > 0.9
+
+
 @pytest.mark.parametrize('dtype', [np.uint8, np.uint16, np.float32])
 def test_constant_image_has_nothing_to_learn(tracker, dtype):
     with pytest.raises(ImageError, match='constant around the box'):
