@@ -19,8 +19,9 @@ Joins the sequences of a dataset to one bag of 30 frames a second, with the targ
 for one and for three seconds and the shutter closed now and then; a mark on
 `init_box_stamped`, as a person makes it, starts the target of each sequence. Plays it through
 the node at the pace of the camera, and writes what was answered: figures for each event and
-each part, and a picture of chosen moments. What is in the output folder already is kept. With
-the package on the path:
+each part, and a picture of chosen moments. What is in the output folder already is kept; with
+`--page`, the figures take the place of what stands between `<!-- recording -->` and
+`<!-- /recording -->` there. With the package on the path:
 python -m benchmarks.field_bag --data DATASET --output FOLDER [--help]
 """
 
@@ -36,6 +37,7 @@ from rclpy.serialization import serialize_message
 from rosbags.typesys import get_typestore, Stores
 from std_msgs.msg import Header
 
+from benchmarks.challenge_table import insert
 from benchmarks.field_answers import Answers, in_parts, read_answers, write_answers
 from benchmarks.field_sheet import draw_sheet
 from benchmarks.joined_recording import join, Part, read_truth, stamp_of, write_truth
@@ -117,18 +119,23 @@ def figures(parts: Sequence[SequenceInfo], answers: Sequence[Answers]) -> list[s
             f'{summary.found} of {back}' if back else NONE, number(summary.found_delay, 0)]
 
 
-def report(parts: Sequence[SequenceInfo], answers: Sequence[Answers]) -> str:
-    """Return the figures for each event, in all, and for each part as Markdown tables."""
+def event_table(parts: Sequence[SequenceInfo], answers: Sequence[Answers]) -> str:
+    """Return the figures for each event, and in all, as a Markdown table."""
     events = {part.challenge for part in parts}
     groups = [(name, [index for index, part in enumerate(parts) if part.challenge == event])
               for event, name in EVENT_NAMES.items() if event in events]
     groups.append(('**in all**', list(range(len(parts)))))
-    rows = [[f'{name} ({len(chosen)} parts)',
-             *figures([parts[index] for index in chosen], [answers[index] for index in chosen])]
-            for name, chosen in groups]
-    each = [[f'{part.full_name}, {EVENT_NAMES.get(part.challenge, part.challenge)}',
-             *figures([part], [answer])] for part, answer in zip(parts, answers)]
-    return f'{_table("event", rows)}\n{_table("part", each)}'
+    return _table('event', [
+        [f'{name} ({len(chosen)} parts)',
+         *figures([parts[index] for index in chosen], [answers[index] for index in chosen])]
+        for name, chosen in groups])
+
+
+def part_table(parts: Sequence[SequenceInfo], answers: Sequence[Answers]) -> str:
+    """Return the figures for each part as a Markdown table."""
+    return _table('part', [
+        [f'{part.full_name}, {EVENT_NAMES[part.challenge]}', *figures([part], [answer])]
+        for part, answer in zip(parts, answers)])
 
 
 def _table(first: str, rows: Sequence[Sequence[str]]) -> str:
@@ -148,6 +155,7 @@ def _options() -> argparse.Namespace:
     parser.add_argument('--threads', type=int, default=0)
     parser.add_argument('--overlay-interval', type=int, default=3)
     parser.add_argument('--picture', default='*', help='pattern of sequences to show')
+    parser.add_argument('--page', type=Path, help='Markdown page that takes the figures')
     return parser.parse_args()
 
 
@@ -172,9 +180,13 @@ def main() -> None:
             'preset': options.preset, 'threads': options.threads,
             'overlay_interval': options.overlay_interval}), answered)
     answers = list(in_parts(parts, read_answers(answered)))
-    text = report(parts, answers)
+    events = event_table(parts, answers)
+    text = f'{events}\n{part_table(parts, answers)}'
     (output / 'report.md').write_text(text, encoding='utf-8')
     print(text)
+    if options.page is not None:
+        page = insert(options.page.read_text(encoding='utf-8'), 'recording', events)
+        options.page.write_text(page, encoding='utf-8')
     shown = [fnmatch(part.full_name, options.picture) for part in parts]
     draw_sheet(parts, answers, shown, played, output / 'moments.jpg')
 

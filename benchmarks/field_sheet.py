@@ -38,8 +38,6 @@ from msg_adapters.image import image_from_message
 __all__ = ['chosen_moments', 'draw_sheet', 'Moment']
 
 _OVERLAY = '/lmsco_tracker/overlay'
-# Drawings are rare, and those of the answer before would show another moment.
-_LATE_NS = 2 * 10 ** 8
 _PARTS_PER_EVENT = 2
 _SHOWN = 240, 192
 _RIM = 4
@@ -48,10 +46,15 @@ _SHUTTER_OPENS = 72
 
 @dataclass(frozen=True)
 class Moment:
-    """A frame of a part, by its number there, and what it shows."""
+    """
+    A frame of a part and what it shows.
+
+    Not every frame is drawn: the next drawing stands for it, up to that of the frame `until`.
+    """
 
     title: str
     frame: int
+    until: int
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,16 +71,18 @@ def chosen_moments(part: SequenceInfo) -> list[Moment]:
     """Return what is worth a look in a part: nothing where nothing happens."""
     last = len(part.ground_truth) - 1
     if part.challenge == 'shutter' and last > _SHUTTER_OPENS:
-        return [Moment('start', 0), Moment('before', 54), Moment('shutter closed', 66),
-                Moment('open again', _SHUTTER_OPENS),
-                Moment('later', min(_SHUTTER_OPENS + 30, last))]
+        after = _SHUTTER_OPENS + 12
+        return [Moment('start', 0, 30), Moment('before', 48, 59), Moment('shutter closed', 61, 71),
+                Moment('open again', _SHUTTER_OPENS, min(after - 1, last)),
+                Moment('later', min(after + 18, last), last)]
     absent = np.flatnonzero(is_absent(part.ground_truth))
     if not part.challenge.startswith('disappear') or not len(absent):
         return []
     begin, end = int(absent[0]), int(absent[-1]) + 1
-    return [Moment('start', 0), Moment('before the loss', begin - 6),
-            Moment('gone', begin + (end - begin) * 3 // 4), Moment('back', min(end + 3, last)),
-            Moment('later', min(end + 30, last))]
+    return [Moment('start', 0, begin - 1), Moment('before the loss', begin - 12, begin - 1),
+            Moment('gone', begin + (end - begin) * 2 // 5, end - 1),
+            Moment('back', min(end + 3, last), min(end + 29, last)),
+            Moment('later', min(end + 30, last), last)]
 
 
 def draw_sheet(parts: Sequence[SequenceInfo], answers: Sequence[Answers],
@@ -129,7 +134,8 @@ def _rows(parts: Sequence[SequenceInfo], answers: Sequence[Answers],
 def _draw(panel: Axes, row: _Row, moment: Moment, reader: AnyReader) -> None:
     """Draw what was drawn of a moment around the target, or around where it was last."""
     panel.set(xticks=[], yticks=[])
-    found = _overlay(reader, stamp_of(row.first + moment.frame))
+    found = _overlay(reader, stamp_of(row.first + moment.frame),
+                     stamp_of(row.first + moment.until))
     if found is None:
         panel.set_title(f'{moment.title}: nothing drawn', fontsize=9)
         return
@@ -154,12 +160,14 @@ def _corner(box: npt.NDArray[np.float64], size: tuple[int, int]) -> tuple[float,
     return (float(np.clip(x, 0, size[0] - _SHOWN[0])), float(np.clip(y, 0, size[1] - _SHOWN[1])))
 
 
-def _overlay(reader: AnyReader, stamp: int) -> tuple[int, npt.NDArray[np.uint8]] | None:
-    """Return the number of the first frame from a stamp on that was drawn, and the drawing."""
+def _overlay(reader: AnyReader, first: int, last: int) -> tuple[int, npt.NDArray[np.uint8]] | None:
+    """Return the number of the first frame drawn between two stamps, and the drawing."""
     connections = [item for item in reader.connections if item.topic == _OVERLAY]
-    for connection, _, data in reader.messages(connections, start=stamp, stop=stamp + _LATE_NS):
+    for connection, _, data in reader.messages(connections, start=first):
         at = serialized_stamp(data)
-        if at >= stamp:
+        if at > last:
+            return None
+        if at >= first:
             message = reader.deserialize(data, connection.msgtype)
             index = round((at - stamp_of(0)) * FRAMES_PER_SECOND * 1e-9)
             return index, image_from_message(message)

@@ -18,7 +18,7 @@ import numpy as np
 import pytest
 
 from benchmarks.field_answers import Answers, in_parts, read_answers, write_answers
-from benchmarks.field_bag import play, report, SIZE, write_bag
+from benchmarks.field_bag import event_table, part_table, play, SIZE, write_bag
 from benchmarks.field_sheet import chosen_moments, draw_sheet
 from benchmarks.joined_recording import Fit, join, read_truth, stamp_of, write_truth
 from lmsco_ros.evaluation.datasets import TrackingSequence
@@ -126,9 +126,8 @@ def test_recording_goes_through_the_node(parts, tmp_path):
     answers = list(in_parts(infos, read_answers(tmp_path / 'answers.csv')))
     for part, answer in zip(parts, answers):
         np.testing.assert_allclose(answer.boxes[0], part.mark.as_tuple(), atol=0.01)
-    text = report(infos, answers)
-    assert '| **in all** (2 parts) | 170 | 170 |' in text
-    assert '| rendered/wide, gone for 1 s | 90 | 90 |' in text
+    assert '| **in all** (2 parts) | 170 | 170 |' in event_table(infos, answers)
+    assert '| rendered/wide, gone for 1 s | 90 | 90 |' in part_table(infos, answers)
     draw_sheet(infos, answers, [True, True], played, tmp_path / 'moments.jpg')
     assert (tmp_path / 'moments.jpg').stat().st_size > 10_000
 
@@ -144,7 +143,7 @@ def test_figures_of_known_answers():
     states[100], boxes[100] = '', np.nan
     latencies = np.where(states == '', np.nan, 10.0)
     part = SequenceInfo('one', 'group', SIZE, truth, {}, 'disappear_1s')
-    text = report([part], [Answers(states, np.full(120, 0.5), latencies, boxes)])
+    text = part_table([part], [Answers(states, np.full(120, 0.5), latencies, boxes)])
     row = text.splitlines()[2].split(' | ')
     assert row[1:6] == ['120', '119', '10.0', '10.0', '10.0']
     assert row[6:9] == [f'{count / 119:.3f}'.lstrip('0') for count in (88, 0, 31)]
@@ -158,6 +157,7 @@ def test_moments_lie_where_they_say():
     assert chosen_moments(plain) == []
     truth[80:110] = np.nan
     gone = SequenceInfo('one', 'group', SIZE, truth, {}, 'disappear_1s')
-    frames = {moment.title: moment.frame for moment in chosen_moments(gone)}
-    assert is_absent(truth[frames['gone']][None])[0]
-    assert frames['before the loss'] < 80 and frames['back'] >= 110
+    absent = {moment.title: is_absent(truth[moment.frame:moment.until + 1])
+              for moment in chosen_moments(gone)}
+    assert all(len(flags) for flags in absent.values())
+    assert absent.pop('gone').all() and not any(flags.any() for flags in absent.values())
