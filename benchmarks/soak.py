@@ -260,27 +260,27 @@ def plot(samples: Sequence[Sample], warm_up: int, path: Path) -> None:
     panels = figure.subplots(3, 1, sharex=True)
     frames = [sample.frames for sample in samples]
 
-    def lines(panel: Axes, names: Sequence[str], unit: str) -> None:
-        for name in names:
+    def lines(panel: Axes, names: dict[str, str], unit: str) -> None:
+        for name, label in names.items():
             panel.plot(frames, [getattr(sample, name) for sample in samples], marker='.',
-                       label=name.removesuffix('_ms').replace('_', ' '))
+                       label=label)
         panel.axvline(warm_up, color='gray', linestyle=':')
         panel.set_ylabel(unit)
         panel.grid(alpha=0.3)
         panel.margins(y=0.15)
 
-    lines(panels[0], ['rss_mib'], 'resident memory, MiB')
+    lines(panels[0], {'rss_mib': 'resident memory'}, 'MiB')
     settled = [sample.rss_mib for sample in samples if sample.frames >= warm_up]
     if settled:
         panels[0].axhspan(settled[0] * (1 - MOST_GROWTH), settled[0] * (1 + MOST_GROWTH),
                           alpha=0.15, label='2 % around the end of the warm-up')
-        panels[0].legend(loc='lower right')
-    lines(panels[1], ['threads', 'open_files'], 'number')
+    lines(panels[1], {'threads': 'threads', 'open_files': 'open files'}, 'number')
+    lines(panels[2], {'latency_p50_ms': 'latency: median', 'latency_p95_ms': '95th percentile',
+                      'latency_p99_ms': '99th percentile'}, 'milliseconds')
     panels[1].set_ylim(bottom=0)
-    panels[1].legend(loc='lower right')
-    lines(panels[2], ['latency_p50_ms', 'latency_p95_ms', 'latency_p99_ms'], 'milliseconds')
     panels[2].set_ylim(bottom=0)
-    panels[2].legend(loc='lower right')
+    for panel in panels:
+        panel.legend(loc='lower right', bbox_to_anchor=(1, 1), ncols=3, frameon=False)
     panels[2].set_xlabel('frames (dotted: end of the warm-up)')
     figure.savefig(path, dpi=110)
 

@@ -51,16 +51,9 @@ class Distractors:
     in which the target was certain, and then the target may have jumped; or it was there, while
     the target was elsewhere. Such a place is followed from then on and forgotten after two
     seconds, since the target may get there.
-
-    Parameters
-    ----------
-    resembles : callable
-        Returns whether a frame shows something like the target in a box.
-
     """
 
-    def __init__(self, resembles: _Resemblance) -> None:
-        self._resembles = resembles
+    def __init__(self) -> None:
         self._places: list[_Place] = []
         self._view: FrameView | None = None
         self._box: BoundingBox | None = None
@@ -85,7 +78,7 @@ class Distractors:
             place.age += 1
         self._places = [place for place in self._places if place.age <= _REMEMBERED_FRAMES]
 
-    def explain(self, found: _Point, last: BoundingBox) -> bool:
+    def explain(self, found: _Point, last: BoundingBox, resembles: _Resemblance) -> bool:
         """
         Return whether something found is a distractor; if so, note its place.
 
@@ -95,6 +88,8 @@ class Distractors:
             Image position (x, y).
         last : BoundingBox
             The target where it was seen last.
+        resembles : callable
+            Returns whether a frame shows something like the target in a box.
 
         """
         side, jump = last.area**0.5, math.dist(found, last.center)
@@ -103,14 +98,14 @@ class Distractors:
         if near:
             min(near, key=lambda place: math.dist(place.center, found)).center = found
             return True
-        if jump < _JUMP * side or not self._was_there(last.moved_to(found)):
+        if jump < _JUMP * side or not self._was_there(last.moved_to(found), resembles):
             return False
         self._places.append(_Place(found))
         return True
 
-    def _was_there(self, box: BoundingBox) -> bool:
+    def _was_there(self, box: BoundingBox, resembles: _Resemblance) -> bool:
         """Return whether the kept frame shows the like, while the target was elsewhere."""
         if self._view is None or self._box is None:
             return False
         apart = math.dist(box.center, self._box.center) >= _JUMP * box.area**0.5
-        return apart and self._resembles(self._view, box)
+        return apart and resembles(self._view, box)

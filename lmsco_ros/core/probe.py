@@ -228,7 +228,10 @@ def _finite(pixels: np.ndarray) -> np.ndarray:
     """Return float32 pixels with the middle of the others in place of those without a value."""
     values = pixels.astype(np.float32, copy=False)
     finite = np.isfinite(values)
-    return values if finite.all() else np.where(finite, values, np.median(values[finite]))
+    if finite.all():
+        return values
+    middle = np.median(values[finite]) if finite.any() else np.float32(0)
+    return np.where(finite, values, middle)
 
 
 def _pattern(probe: np.ndarray, low: float, high: float) -> np.ndarray | None:

@@ -75,7 +75,7 @@ class Track:
         self._monitor = ConfidenceMonitor(config.confidence)
         view = FrameView(image, self._gain.examine(image).intensity)
         self._detector = Detector(config, backend, networks, view, box)
-        self._distractors = Distractors(self._resembles)
+        self._distractors = Distractors()
         self._pursuit = Pursuit(config.confidence.tiles)
         self._scale = make_scale_estimator(config.scale, box.size)
         self._scale.learn(view, box)
@@ -124,9 +124,13 @@ class Track:
         """Return the best detection, or where the target is expected if that is a distractor."""
         self._distractors.next_frame()
         detection = self._detector(view, expected, self._scale.search_factors)
-        if self._distractors.explain(detection.center, self._box):
+        if self._is_distractor(detection):
             return self._detector.near(detection, expected.center)
         return detection
+
+    def _is_distractor(self, detection: Detection) -> bool:
+        """Return whether something else than the target was detected; if so, note its place."""
+        return self._distractors.explain(detection.center, self._box, self._resembles)
 
     def _resembles(self, view: FrameView, box: BoundingBox) -> bool:
         """Return whether a frame shows something like the target in a box."""
@@ -146,8 +150,7 @@ class Track:
         """Return a convincing detection in other regions of the image, or the one here."""
         # A distractor has to be watched, or it gets away from its place and looks new.
         for place in self._distractors.places:
-            self._distractors.explain(
-                self._detector(view, expected.moved_to(place)).center, self._box)
+            self._is_distractor(self._detector(view, expected.moved_to(place)))
         # While the shutter was closed the target may have got further than in a frame.
         slices = 2 if self._frozen else 1
         places = self._pursuit.slice(view.size, here.region.width, expected.center, slices)
@@ -157,8 +160,7 @@ class Track:
             best = self._detector(view, expected.moved_to(other.center))
             seen = self._weigh(view, best, expected)
             better = self._monitor.score(seen) > self._monitor.score(evidence)
-            if (better and self._monitor.convincing(seen)
-                    and not self._distractors.explain(best.center, self._box)):
+            if better and self._monitor.convincing(seen) and not self._is_distractor(best):
                 return best, seen
         return here, evidence
 

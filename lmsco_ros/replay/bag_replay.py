@@ -22,6 +22,8 @@ from itertools import islice
 from pathlib import Path
 import time
 
+from geometry_msgs.msg import PolygonStamped
+from rclpy.serialization import deserialize_message
 from rosbags.highlevel import AnyReader
 from rosbags.interfaces import Connection
 from rosbags.rosbag2 import Writer
@@ -35,7 +37,9 @@ from lmsco_ros.replay.errors import SourceError
 from lmsco_ros.replay.node_session import Heard, NODE_NAME, NodeSession, OUTPUTS
 from lmsco_ros.replay.player import Exchange, Player
 from lmsco_ros.replay.storage import Storage
+from msg_adapters.boxes import box_from_polygon
 
+MARKS_TOPIC = '/init_box_stamped'
 # While the node tracks one frame, the next one is on its way; the start is waited for.
 _AHEAD = 1
 _LINGER_SECONDS = 0.3
@@ -52,8 +56,8 @@ class ReplayPlan:
         Recording, and the new bag.
     storage : Storage
         File format of the new bag.
-    box : BoundingBox
-        Target in the first image.
+    box : BoundingBox or None
+        Target in the first image; None: the boxes that the bag has on `init_box_stamped`.
     topic : str
         Image topic; empty when there is only one.
     rate : float
@@ -70,7 +74,7 @@ class ReplayPlan:
     bag: Path
     output: Path
     storage: Storage
-    box: BoundingBox
+    box: BoundingBox | None
     topic: str
     rate: float
     frames: int | None
@@ -133,13 +137,15 @@ def _play(plan: ReplayPlan, reader: AnyReader, images: Connection, player: Playe
                 player.listen_until(pace.moment(logged))
             else:
                 player.settle(_AHEAD if sent > 1 else 0)
-            if not sent:
+            if not sent and plan.box is not None:
                 player.start(plan.box, stamp)
             recorder.copy(connection, logged, data)
             player.send(stamp, data)
             sent += 1
             on_frame()
         else:
+            if plan.box is None and connection.topic == MARKS_TOPIC:
+                player.start(_marked(data), serialized_stamp(data))
             recorder.copy(connection, logged, data)
     if plan.rate:
         player.finish()
@@ -155,6 +161,11 @@ def _last_moment(reader: AnyReader, images: Connection, frames: int | None) -> i
         return reader.end_time
     *_, last = islice((logged for _, logged, _ in reader.messages([images])), frames)
     return last
+
+
+def _marked(data: bytes) -> BoundingBox:
+    """Return the box of a serialized message that asks for a start."""
+    return BoundingBox(*box_from_polygon(deserialize_message(data, PolygonStamped)))
 
 
 class _Pace:

@@ -106,7 +106,8 @@ class NodeSession:
                  make_node: Callable[..., TrackerNode] = TrackerNode) -> None:
         # The graph is nobody's business but ours; the user may decide otherwise.
         os.environ.setdefault('ROS_AUTOMATIC_DISCOVERY_RANGE', 'LOCALHOST')
-        self._heard: queue.SimpleQueue[Heard] = queue.SimpleQueue()
+        # Not a SimpleQueue, which may wait for ever when asked to wait for a few microseconds.
+        self._heard: queue.Queue[Heard] = queue.Queue()
         self._outputs = dict.fromkeys(('box', 'status', *outputs))
         self._context = Context()
         rclpy.init(context=self._context)

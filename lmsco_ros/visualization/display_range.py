@@ -20,6 +20,7 @@ import numpy as np
 import numpy.typing as npt
 
 from lmsco_ros.core.errors import ImageError
+from lmsco_ros.core.intensity import measured
 
 _PERCENTILES = (0.5, 99.5)
 # Share of the span left free below and above, so that a small hot target outside
@@ -77,6 +78,7 @@ class DisplayRange:
             raise ImageError(
                 f'cannot display an image of shape {image.shape} and type {image.dtype}; '
                 'give (H, W) numbers or (H, W, 3) uint8')
+        image = measured(image)
         low, high = self._follow(image)
         view = (image.astype(np.float32) - np.float32(low)) * np.float32(255 / (high - low))
         return np.nan_to_num(np.clip(view, 0, 255), copy=False).astype(np.uint8)

@@ -54,64 +54,64 @@ def scenery():
 @pytest.fixture
 def distractors(scenery):
     """Return a memory that has seen a target, with something like it beside."""
-    result = Distractors(scenery.resembles)
+    result = Distractors()
     result.certain(scenery.view(BOX.center, TWIN), BOX)
     result.next_frame()
     return result
 
 
-def test_what_was_there_before_is_a_distractor(distractors):
-    assert distractors.explain(TWIN, BOX)
+def test_what_was_there_before_is_a_distractor(distractors, scenery):
+    assert distractors.explain(TWIN, BOX, scenery.resembles)
     assert distractors.places == [TWIN]
 
 
-def test_what_was_not_there_may_be_the_target(distractors):
-    assert not distractors.explain((40.0, 180.0), BOX)
+def test_what_was_not_there_may_be_the_target(distractors, scenery):
+    assert not distractors.explain((40.0, 180.0), BOX, scenery.resembles)
     assert distractors.places == []
 
 
 def test_target_that_moves_is_not_asked_about(distractors, scenery):
     for place in ((100.0, 100.0), (115.0, 105.0)):
-        assert not distractors.explain(place, BOX)
+        assert not distractors.explain(place, BOX, scenery.resembles)
     assert scenery.asked == 0
 
 
 def test_frame_without_a_certain_target_says_nothing(scenery):
-    assert not Distractors(scenery.resembles).explain(TWIN, BOX)
+    assert not Distractors().explain(TWIN, BOX, scenery.resembles)
 
 
-def test_distractor_is_followed_and_does_not_spread(distractors):
-    distractors.explain(TWIN, BOX)
+def test_distractor_is_followed_and_does_not_spread(distractors, scenery):
+    distractors.explain(TWIN, BOX, scenery.resembles)
     place = TWIN
     for _ in range(8):
         place = (place[0] + 6, place[1] - 5)
-        assert distractors.explain(place, BOX)
+        assert distractors.explain(place, BOX, scenery.resembles)
     assert distractors.places == [place]
     # Where it was at first, a target may be by now; it is not at the known place any more.
-    assert not distractors.explain((60.0, 60.0), BOX)
+    assert not distractors.explain((60.0, 60.0), BOX, scenery.resembles)
 
 
-def test_known_distractor_wins_near_the_target(distractors):
-    distractors.explain(TWIN, BOX)
+def test_known_distractor_wins_near_the_target(distractors, scenery):
+    distractors.explain(TWIN, BOX, scenery.resembles)
     beside = BOX.moved_to((134.0, 110.0))
-    assert distractors.explain((148.0, 110.0), beside)
-    assert not distractors.explain((137.0, 110.0), beside)
+    assert distractors.explain((148.0, 110.0), beside, scenery.resembles)
+    assert not distractors.explain((137.0, 110.0), beside, scenery.resembles)
 
 
-def test_distractor_is_forgotten_after_two_seconds(distractors):
-    distractors.explain(TWIN, BOX)
+def test_distractor_is_forgotten_after_two_seconds(distractors, scenery):
+    distractors.explain(TWIN, BOX, scenery.resembles)
     for _ in range(60):
-        assert distractors.explain(TWIN, BOX)
+        assert distractors.explain(TWIN, BOX, scenery.resembles)
         distractors.next_frame()
     distractors.next_frame()
-    assert distractors.places == [] and not distractors.explain(TWIN, BOX)
+    assert distractors.places == [] and not distractors.explain(TWIN, BOX, scenery.resembles)
 
 
 def test_kept_frame_is_a_copy(scenery):
-    view, distractors = scenery.view(BOX.center, TWIN), Distractors(scenery.resembles)
+    view, distractors = scenery.view(BOX.center, TWIN), Distractors()
     distractors.certain(view, BOX)
     view.image[:] = 0
-    assert distractors.explain(TWIN, BOX)
+    assert distractors.explain(TWIN, BOX, scenery.resembles)
 
 
 def walk(pursuit, step, count):

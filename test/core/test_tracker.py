@@ -14,6 +14,9 @@
 
 """The tracker as its users see it: what it takes, what it gives, what it refuses."""
 
+import gc
+import weakref
+
 from hypothesis import given, settings, strategies as st
 import numpy as np
 import pytest
@@ -199,6 +202,42 @@ def test_frame_without_a_value_is_refused_and_the_target_is_kept(scene, tracker)
     assert tracker.update(image + np.float32(1)).box.overlap(box_of()) > 0.9
 
 
+def rows_of_noise(image):
+    image[:4] = np.random.default_rng(1).uniform(-3e38, 3e38, image[:4].shape)
+
+
+def far_numbers(image):
+    image[5::9, 3::11], image[7::9, 5::11] = 3e38, -3e38
+
+
+def half(image):
+    image[:, :image.shape[1] // 2] = 3e38
+
+
+@pytest.mark.filterwarnings('error')
+@pytest.mark.parametrize('spoil', [rows_of_noise, far_numbers, half])
+def test_numbers_that_no_camera_measures_count_as_none(scene, tracker, spoil):
+    first, image, spoiled = (scene.render(CENTER).astype(np.float32) + n for n in range(3))
+    spoil(spoiled)
+    tracker.initialize(first, box_of())
+    with np.errstate(over='raise', invalid='raise', divide='raise'):
+        result = tracker.update(spoiled)
+    assert np.isfinite(result.confidence_map).all() and 0 <= result.score <= 1
+    after = tracker.update(image)
+    assert after.box.overlap(box_of()) > 0.9 and after.state is TrackState.TRACKING
+
+
+@pytest.mark.filterwarnings('error')
+def test_frame_of_numbers_that_no_camera_measures_is_refused(scene, tracker):
+    image = scene.render(CENTER).astype(np.float32)
+    tracker.initialize(image, box_of())
+    noise = np.random.default_rng(1).uniform(-3e38, 3e38, image.shape).astype(np.float32)
+    for nonsense in (np.full_like(image, 3e38), np.where(noise > 0, 3e38, -3e38), noise):
+        with pytest.raises(ImageError, match='no finite pixel'):
+            tracker.update(nonsense.astype(np.float32))
+    assert tracker.update(image + np.float32(1)).box.overlap(box_of()) > 0.9
+
+
 @pytest.mark.parametrize('dtype', [np.uint8, np.uint16, np.float32])
 def test_constant_image_has_nothing_to_learn(tracker, dtype):
     with pytest.raises(ImageError, match='constant around the box'):
@@ -310,3 +349,20 @@ def test_every_way_of_learning_tracks(scene, learning):
         confidence=ConfidenceConfig(tiles=0))
     last = walk(scene, 9, config)[-1]
     assert last.box.overlap(box_of((CENTER[0] + 8, CENTER[1]))) > 0.75
+
+
+@pytest.mark.parametrize('preset', ['default', 'hcs'])
+def test_former_target_is_freed_without_the_garbage_collector(scene, preset):
+    # Tens of megabytes that would wait for a collection, which pauses and rarely comes.
+    tracker = LMSCOTracker(TrackerConfig.preset(preset))
+    gc.disable()
+    try:
+        tracker.initialize(later(scene, 0), box_of())
+        # A frame without the target and one with it: everything is looked at once.
+        tracker.update(scene.frame((-50, -50)))
+        tracker.update(later(scene))
+        former = weakref.ref(tracker._track)
+        tracker.initialize(later(scene, 2), box_of())
+        assert former() is None
+    finally:
+        gc.enable()

@@ -17,6 +17,7 @@
 
 import numpy as np
 import pytest
+from sensor_msgs.msg import Image
 
 from lmsco_ros.node.tracker_factory import make_tracker
 
@@ -73,7 +74,7 @@ def test_frame_of_another_size_is_refused_and_costs_nothing(run):
 
 
 @pytest.mark.parametrize('value, states', [
-    (np.nan, ['refused']), (np.inf, ['refused']), (-np.inf, ['refused']),
+    (np.nan, ['refused']), (np.inf, ['refused']), (-np.inf, ['refused']), (3e38, ['refused']),
     # As a camera's shutter makes it.
     (0.0, ['lost', 'uncertain'])])
 def test_frame_of_nonsense_temperatures_costs_nothing(run, value, states):
@@ -93,3 +94,23 @@ def test_frame_of_nonsense_temperatures_costs_nothing(run, value, states):
     assert len(running.boxes) == boxes + (status.state == 'uncertain')
     status = running.send(image(5))
     assert (status.state, status.track_id) == ('tracking', 1)
+
+
+@pytest.mark.filterwarnings('error::RuntimeWarning')
+def test_numbers_that_no_camera_measures_cost_nothing(run):
+    """Everything that the node computes of a frame is asked for, drawings too."""
+    running = run(tracker_factory=make_tracker, radiometric_scale=1.0)
+    overlays = running.graph.listen(Image, 'lmsco_tracker/overlay')
+    running.start(30, 30, 20, 20)
+    for number in range(6):
+        message = running.graph.image(shape=SHAPE, dtype=np.float32)
+        pixels = np.frombuffer(message.data, np.float32).reshape(SHAPE)
+        pixels[:] = _scene(number)
+        if number > 2:
+            pixels[::7, ::5], pixels[3::7, 2::5], pixels[:4] = 3e38, -3e38, 3e38
+        status = running.send(message)
+        assert status.state == 'tracking', status.message
+        x, y, width, height = running.last_box
+        assert x + width / 2 == pytest.approx(40.5 + 2 * number, abs=2)
+        assert y + height / 2 == pytest.approx(40.5 + number, abs=2)
+    running.graph.spin_until(lambda: len(overlays) == 6)

@@ -72,3 +72,13 @@ def test_wrong_parameters_end_main_with_a_reason(capfd, arguments, word):
     assert main(['--ros-args', *arguments]) == 1
     errors = capfd.readouterr().err
     assert word in errors and 'Traceback' not in errors
+
+
+def test_collections_do_not_go_through_the_libraries():
+    """A full collection while running would take as long as several frames."""
+    code = ('import gc, rclpy; from lmsco_ros.node import tracker_node; rclpy.init(); '
+            'tracker_node._run([2]); print(gc.get_freeze_count(), len(gc.get_objects()))')
+    process = subprocess.run([sys.executable, '-c', code], cwd=REPOSITORY, capture_output=True,
+                             text=True, timeout=60, check=True)
+    frozen, others = map(int, process.stdout.split()[-2:])
+    assert frozen > 100_000 and frozen > 10 * others

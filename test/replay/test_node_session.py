@@ -148,3 +148,17 @@ def test_sessions_follow_each_other():
         with session(Follower()) as running:
             play(Player(running), [1, 2])
     assert not [t for t in threading.enumerate() if t.name == 'lmsco_tracker']
+
+
+def test_waiting_for_a_moment_never_takes_for_ever():
+    """A moment that is over by the time the wait begins is the rule at a camera's pace."""
+    with session(Follower()) as running:
+        def listen():
+            for _ in range(20_000):
+                running._heard.put(None)
+                running.next_message(1.0)
+                running.next_message(1e-9)
+        thread = threading.Thread(target=listen, daemon=True)
+        thread.start()
+        thread.join(30)
+        assert not thread.is_alive()
