@@ -63,6 +63,12 @@ def peak_to_sidelobe_ratio(grid: np.ndarray, exclude: int) -> float:
 _USUAL_PRESENCE = 4.0
 _USUAL_RATE = 0.03
 
+# After a cut the target is likely to be somewhere in the picture, and looks different: parts of
+# the thresholds that it has to reach, and log-odds of presence that it may lack.
+_CUT_PARTS = 0.5
+_CUT_PRESENCE = -2.0
+_CUT_FOUND = 0.8
+
 
 @dataclass(frozen=True)
 class Evidence:
@@ -108,11 +114,17 @@ class ConfidenceMonitor:
     _reference: float | None = None
     _state: TrackState = TrackState.TRACKING
     _misses: int = 0
+    _cut: bool = False
 
     @property
     def state(self) -> TrackState:
         """State after the last judged frame."""
         return self._state
+
+    @property
+    def after_cut(self) -> bool:
+        """Whether the target has not been seen since the view changed."""
+        return self._cut
 
     @property
     def learns(self) -> bool:
@@ -145,13 +157,19 @@ class ConfidenceMonitor:
         """
         Return whether a frame shows the target even where it was not expected.
 
-        Filter, first filter and comparison must agree, each of them.
+        Filter, first filter and comparison must agree, each of them; less so after a cut.
         """
         presence = self.presence(evidence)
-        return (self.score(evidence) >= self.config.found
-                and self.quality(evidence.sharpness) >= self.config.sharp
-                and evidence.likeness >= self.config.alike
-                and (presence is None or presence >= 0))
+        part = _CUT_PARTS if self._cut else 1.0
+        found = min(self.config.found, _CUT_FOUND) if self._cut else self.config.found
+        return (self.score(evidence) >= found
+                and self.quality(evidence.sharpness) >= part * self.config.sharp
+                and evidence.likeness >= part * self.config.alike
+                and (presence is None or presence >= (_CUT_PRESENCE if self._cut else 0.0)))
+
+    def cut(self) -> None:
+        """Take note that the view has changed: the target has to be found again."""
+        self._cut = True
 
     def believable(self, evidence: Evidence) -> bool:
         """Return whether a frame shows the target."""
@@ -170,6 +188,7 @@ class ConfidenceMonitor:
         missed = self._misses_target(evidence)
         self._misses = self._misses + 1 if missed else 0
         if not missed:
+            self._cut = False
             self._state = (TrackState.TRACKING if score >= self._certain()
                            else TrackState.UNCERTAIN)
             self._set_reference(evidence)
@@ -180,7 +199,7 @@ class ConfidenceMonitor:
 
     def _misses_target(self, evidence: Evidence) -> bool:
         """Return whether a frame does not show the target, as far as one can tell."""
-        if self._state is TrackState.LOST:
+        if self._cut or self._state is TrackState.LOST:
             return not self.convincing(evidence)
         jumped = evidence.jump > _JUMP
         return self.score(evidence) < (self.config.uncertain if jumped else self.config.lost)

@@ -165,7 +165,7 @@ def _presets() -> Mapping[str, TrackerConfig]:
         sampling=SamplingConfig(patch_size_min=200, patch_size_max=300),
         networks=NetworkConfig('vgg_m_2048', 'motion_cnn'),
         scale=ScaleConfig('search', step=1.03, exponent_min=-4, exponent_max=5),
-        confidence=ConfidenceConfig(learn='always', tiles=0, distractors=False))
+        confidence=ConfidenceConfig(learn='always', candidates=0, tiles=0, distractors=False))
     unscaled = replace(paper, scale=ScaleConfig('none'))
     return {
         'default': TrackerConfig(

@@ -69,6 +69,10 @@ class Distractors:
         if self._view is None or self._age >= view.image.nbytes / _COPIED_BYTES:
             self._view, self._box, self._age = view.copied(), box, 0
 
+    def forget(self) -> None:
+        """Forget all places: the view has changed."""
+        self._view, self._places = None, []
+
     def next_frame(self) -> None:
         """Count a frame, and forget what is too old to say anything."""
         self._age += 1

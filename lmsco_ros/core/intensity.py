@@ -23,7 +23,7 @@ import numpy as np
 from lmsco_ros.core.config import IntensityConfig
 from lmsco_ros.core.errors import ImageError
 from lmsco_ros.core.probe import (
-    credible_values, is_frozen, percentiles, PolarityTracker, take_probe, to_gray)
+    credible_values, is_frozen, percentiles, SceneMonitor, take_probe, to_gray)
 
 __all__ = ['AutomaticGain', 'check_image', 'FrameCondition', 'IntensityRange', 'measured',
            'to_gray']
@@ -79,12 +79,15 @@ class FrameCondition:
         a flat-field correction, or the source repeats itself. It shows nothing new.
     inverted : bool
         Whether the polarity (white hot, black hot) is not the one of the first frame.
+    cut : bool
+        Whether it shows another view than the frame before.
 
     """
 
     intensity: IntensityRange
     frozen: bool
     inverted: bool
+    cut: bool
 
 
 def check_image(image: np.ndarray) -> None:
@@ -143,7 +146,7 @@ class AutomaticGain:
 
     def __init__(self, config: IntensityConfig) -> None:
         self._config = config
-        self._polarity = PolarityTracker()
+        self._scene = SceneMonitor()
         self._probe: np.ndarray | None = None
         self._range: IntensityRange | None = None
 
@@ -168,12 +171,14 @@ class AutomaticGain:
         """
         probe = take_probe(image)
         upright, mirrored = self._measure(image, probe)
-        switched = self._polarity.observe(probe, upright.low, upright.high)
-        inverted = self._polarity.inverted
-        self._range = self._follow(mirrored if inverted else upright, at_once=switched)
+        change = self._scene.observe(probe, upright.low, upright.high)
+        inverted = self._scene.inverted
+        self._range = self._follow(mirrored if inverted else upright,
+                                   at_once=change.switched or change.cut)
         frozen = self._probe is not None and is_frozen(self._probe, probe)
         self._probe = probe
-        return FrameCondition(self._range.turned() if inverted else self._range, frozen, inverted)
+        return FrameCondition(self._range.turned() if inverted else self._range, frozen, inverted,
+                              change.cut)
 
     def _measure(self, image: np.ndarray,
                  probe: np.ndarray) -> tuple[IntensityRange, IntensityRange]:

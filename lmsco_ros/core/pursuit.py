@@ -49,6 +49,12 @@ class Pursuit:
         self._ahead = 0.0
         self._order: list[_Point] = []
         self._next = 0
+        self._misses = 0
+
+    @property
+    def misses(self) -> int:
+        """Number of frames since the target was seen."""
+        return self._misses
 
     def seen(self, center: _Point) -> None:
         """Take note of where the target is in this frame."""
@@ -58,11 +64,16 @@ class Pursuit:
                               self._velocity[1] + _SMOOTHING * (step[1] - self._velocity[1]))
         elif self._ahead:
             self._velocity = (0.0, 0.0)
-        self._last, self._ahead, self._order = center, 0.0, []
+        self._last, self._ahead, self._order, self._misses = center, 0.0, [], 0
+
+    def cut(self) -> None:
+        """Take note that the view has changed: the target does not go on as it did."""
+        self._velocity, self._order = (0.0, 0.0), []
 
     def missed(self) -> None:
         """Take note of a frame in which the target was not seen."""
         self._ahead = 1 + _DAMPING * self._ahead
+        self._misses += 1
 
     def expected(self, box: BoundingBox, image_size: tuple[int, int]) -> BoundingBox:
         """

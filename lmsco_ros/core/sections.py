@@ -359,8 +359,9 @@ class ConfidenceConfig:
     sharp, alike : float
         Sharpness, as a part of the reference, and score of the first frame's filter, as a part
         of that in the first frame, that a target has to reach for this.
-    tiles : int
-        Other regions of the image that are searched per frame while the target is missing.
+    candidates, tiles : int
+        Salient places, and other regions of the image, that are searched per frame while the
+        target is missing.
     distractors : bool
         Whether other peaks of the score are remembered, so that they do not take the place of
         a target that vanishes.
@@ -376,7 +377,8 @@ class ConfidenceConfig:
     found: float = 0.9
     sharp: float = 0.4
     alike: float = 0.3
-    tiles: int = 4
+    candidates: int = 4
+    tiles: int = 2
     distractors: bool = True
 
     def __post_init__(self) -> None:
@@ -390,6 +392,7 @@ class ConfidenceConfig:
         check_range(self, 'sharp', 0, 2)
         check_range(self, 'alike', -1, 2)
         check_range(self, 'lost_frames', 1, 1000)
+        check_range(self, 'candidates', 0, 64)
         check_range(self, 'tiles', 0, 64)
 
 

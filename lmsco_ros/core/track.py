@@ -16,6 +16,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 import math
 
 import numpy as np
@@ -29,12 +30,40 @@ from lmsco_ros.core.fourier.localization import centered_map
 from lmsco_ros.core.intensity import AutomaticGain
 from lmsco_ros.core.networks import Networks
 from lmsco_ros.core.pursuit import Pursuit
+from lmsco_ros.core.salience import Salience
 from lmsco_ros.core.sampling import check_box, clamp_box, FrameView, visible_part
 from lmsco_ros.core.scale import make_scale_estimator
 from lmsco_ros.core.types import BoundingBox, TrackResult, TrackState
 from lmsco_ros.core.verification import Verification
 
 __all__ = ['Track']
+
+# Frames in which all salient places get their turn.
+_TURNS = 4
+
+# Sizes of the target that are considered after a cut.
+_CUT_SCALES = (1.0, 0.7, 1.4)
+
+
+@dataclass(frozen=True)
+class _Sighting:
+    """
+    Something that may be the target.
+
+    Attributes
+    ----------
+    box : BoundingBox
+        Where it was looked for, in the size that it was taken to have.
+    detection : Detection
+        What the filter saw there.
+    evidence : Evidence
+        What speaks for it.
+
+    """
+
+    box: BoundingBox
+    detection: Detection
+    evidence: Evidence
 
 
 class Track:
@@ -69,6 +98,7 @@ class Track:
         check_box(box, (image.shape[1], image.shape[0]))
         self._config = config
         self._box = box
+        self._expected = box.center
         self._frame = 0
         self._frozen = 0
         self._gain = AutomaticGain(config.intensity)
@@ -81,6 +111,7 @@ class Track:
         self._scale.learn(view, box)
         self._verification = None if networks.verification is None else Verification(
             networks.verification, view, box)
+        self._salience = Salience(view, box)
         first = self._detector(view, box)
         self._first_peak = first.peak.value
         self._first_likeness = self._detector.likeness(first)
@@ -95,23 +126,26 @@ class Track:
             self._frozen += 1
             return self.result
         self._frame += 1
+        if condition.cut:
+            self._start_over()
         view = FrameView(image, condition.intensity)
         expected = self._pursuit.expected(self._box, view.size)
-        detection = self._look(view, expected)
-        evidence = self._weigh(view, detection, expected)
-        if self._frozen or not self._monitor.believable(evidence):
-            detection, evidence = self._search_elsewhere(view, expected, detection, evidence)
+        self._expected = expected.center
+        sighting = self._look(view, expected)
+        if self._frozen or not self._monitor.believable(sighting.evidence):
+            sighting = self._search_elsewhere(view, expected, sighting)
         self._frozen = 0
-        believed = self._monitor.believable(evidence)
-        state = self._monitor.judge(evidence)
+        believed = self._monitor.believable(sighting.evidence)
+        state = self._monitor.judge(sighting.evidence)
         if believed:
-            self._follow(view, self._resized(view, detection))
+            self._follow(view, self._resized(view, sighting))
         else:
             self._pursuit.missed()
         if self._monitor.learns:
-            self._learn(view, detection)
+            self._learn(view, sighting.detection)
         self._detector.watch(view, self._pursuit.expected(self._box, view.size))
-        self.result = self._describe(detection, self._monitor.score(evidence), state)
+        self.result = self._describe(
+            sighting.detection, self._monitor.score(sighting.evidence), state)
         return self.result
 
     def _describe(self, detection: Detection, score: float, state: TrackState) -> TrackResult:
@@ -120,13 +154,19 @@ class Track:
         shown = visible_part(self._box, (self.image_shape[1], self.image_shape[0]))
         return TrackResult(shown, score, state, confidence_map, detection.region)
 
-    def _look(self, view: FrameView, expected: BoundingBox) -> Detection:
+    def _start_over(self) -> None:
+        """Expect nothing of a view that has changed at once, but that it shows the target."""
+        self._monitor.cut()
+        self._pursuit.cut()
+        self._distractors.forget()
+
+    def _look(self, view: FrameView, expected: BoundingBox) -> _Sighting:
         """Return the best detection, or where the target is expected if that is a distractor."""
         self._distractors.next_frame()
         detection = self._detector(view, expected, self._scale.search_factors)
         if self._is_distractor(detection):
-            return self._detector.near(detection, expected.center)
-        return detection
+            detection = self._detector.near(detection, expected.center)
+        return self._weigh(view, detection, expected)
 
     def _is_distractor(self, detection: Detection) -> bool:
         """Return whether something else than the target was detected; if so, note its place."""
@@ -135,39 +175,62 @@ class Track:
     def _resembles(self, view: FrameView, box: BoundingBox) -> bool:
         """Return whether a frame shows something like the target in a box."""
         seen = self._detector.near(self._detector(view, box), box.center)
-        return self._monitor.similar(self._weigh(view, seen, box))
+        return self._monitor.similar(self._weigh(view, seen, box).evidence)
 
-    def _weigh(self, view: FrameView, detection: Detection, expected: BoundingBox) -> Evidence:
-        """Return what speaks for a detection."""
+    def _weigh(self, view: FrameView, detection: Detection, box: BoundingBox) -> _Sighting:
+        """Return what speaks for a detection around a box."""
         presence = None if self._verification is None else self._verification(
-            view, self._box.moved_to(detection.center))
+            view, box.moved_to(detection.center))
         likeness = self._detector.likeness(detection) / self._first_likeness
-        jump = math.dist(detection.center, expected.center) / expected.area**0.5
-        return Evidence(detection.sharpness, likeness, presence, jump)
+        jump = math.dist(detection.center, self._expected) / self._box.area**0.5
+        return _Sighting(box, detection, Evidence(detection.sharpness, likeness, presence, jump))
 
-    def _search_elsewhere(self, view: FrameView, expected: BoundingBox, here: Detection,
-                          evidence: Evidence) -> tuple[Detection, Evidence]:
-        """Return a convincing detection in other regions of the image, or the one here."""
+    def _search_elsewhere(self, view: FrameView, expected: BoundingBox,
+                          here: _Sighting) -> _Sighting:
+        """Return what convinces most in other places of the image, or what is here."""
         # A distractor has to be watched, or it gets away from its place and looks new.
         for place in self._distractors.places:
             self._is_distractor(self._detector(view, expected.moved_to(place)))
+        seen = [self._weigh(view, self._detector(view, box), box)
+                for box in self._candidates(view, expected)]
+        seen += self._search_tiles(view, expected, here.detection.region.width)
+        seen.sort(key=lambda sighting: -self._monitor.score(sighting.evidence))
+        least = self._monitor.score(here.evidence)
+        for other in seen:
+            if (self._monitor.score(other.evidence) > least
+                    and self._monitor.convincing(other.evidence)
+                    and not self._is_distractor(other.detection)):
+                return other
+        return here
+
+    def _candidates(self, view: FrameView, expected: BoundingBox) -> list[BoundingBox]:
+        """Return the salient places whose turn it is."""
+        count = self._config.confidence.candidates
+        if not count:
+            return []
+        found = self._salience.candidates(view, expected, _TURNS * count, _CUT_SCALES if self._monitor.after_cut else (1.0,))
+        first = self._pursuit.misses % _TURNS * count
+        return found[first:first + count]
+
+    def _search_tiles(self, view: FrameView, expected: BoundingBox,
+                      side: float) -> list[_Sighting]:
+        """Return the sharpest detection in the regions whose turn it is."""
         # While the shutter was closed the target may have got further than in a frame.
         slices = 2 if self._frozen else 1
-        places = self._pursuit.slice(view.size, here.region.width, expected.center, slices)
+        places = self._pursuit.slice(view.size, side, expected.center, slices)
         found = [self._detector(view, expected.moved_to(place)) for place in places]
-        for other in sorted(found, key=lambda detection: -detection.sharpness)[:2]:
-            # The window of a tile dims what lies off its center: look again from there.
-            best = self._detector(view, expected.moved_to(other.center))
-            seen = self._weigh(view, best, expected)
-            better = self._monitor.score(seen) > self._monitor.score(evidence)
-            if better and self._monitor.convincing(seen) and not self._is_distractor(best):
-                return best, seen
-        return here, evidence
+        if not found:
+            return []
+        sharpest = max(found, key=lambda detection: detection.sharpness)
+        # The window of a tile dims what lies off its center: look again from there.
+        box = expected.moved_to(sharpest.center)
+        return [self._weigh(view, self._detector(view, box), box)]
 
-    def _resized(self, view: FrameView, detection: Detection) -> BoundingBox:
-        """Return the box at the detection, in the size of the target there."""
+    def _resized(self, view: FrameView, sighting: _Sighting) -> BoundingBox:
+        """Return the box at a sighting, in the size of the target there."""
+        detection = sighting.detection
         scale = self._scale.found_factor(detection.peak.scale_values)
-        moved = clamp_box(self._box.moved_to(detection.center).scaled(scale), view.size)
+        moved = clamp_box(sighting.box.moved_to(detection.center).scaled(scale), view.size)
         return clamp_box(moved.scaled(self._scale.estimate(view, moved)), view.size)
 
     def _follow(self, view: FrameView, box: BoundingBox) -> None:
