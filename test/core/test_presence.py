@@ -72,6 +72,22 @@ def test_target_that_jumps_where_nothing_was_is_followed(scene):
     assert results[-1].box.center == pytest.approx(elsewhere, abs=1.0)
 
 
+def test_target_of_another_view_is_found_at_once(scene, make_scene):
+    other, elsewhere = make_scene((240, 160), 5), (START[0] + 110, START[1] + 40)
+    tracker = started(scene, resting(scene))
+    results = [tracker.update(resting(other, elsewhere)(n)) for n in range(6, 10)]
+    assert results[1].state is not TrackState.LOST
+    assert results[-1].state is TrackState.TRACKING
+    assert results[-1].box.center == pytest.approx(elsewhere, abs=1.5)
+
+
+def test_view_without_the_target_ends_in_lost(scene, make_scene):
+    other = make_scene((240, 160), 5)
+    tracker = started(scene, resting(scene))
+    results = [tracker.update(resting(other, None)(n)) for n in range(6, 16)]
+    assert results[-1].state is TrackState.LOST
+
+
 def test_target_leaves_the_image_and_comes_back(scene):
     tracker = started(scene, resting(scene))
     x = [START[0] - 5 * n for n in range(1, 26)]

@@ -23,7 +23,8 @@ from lmsco_ros.core.config import IntensityConfig
 from lmsco_ros.core.errors import ImageError
 from lmsco_ros.core.intensity import AutomaticGain, IntensityRange
 from lmsco_ros.core.probe import (
-    credible_values, is_frozen, percentiles, PolarityTracker, take_probe, without_dead_pixels)
+    credible_values, is_frozen, percentiles, SceneChange, SceneMonitor, take_probe,
+    without_dead_pixels)
 
 SHAPE = (120, 160)
 
@@ -83,27 +84,34 @@ def test_frozen_frames_may_have_pixels_without_a_value_and_telemetry():
 @given(st.lists(st.tuples(st.integers(0, 39), st.booleans(), st.floats(0.3, 3),
                           st.floats(-3000, 3000)), min_size=1, max_size=8))
 def test_polarity_follows_every_switch_under_motion_gain_and_offset(frames):
-    tracker, before, place = PolarityTracker(), False, 0
+    tracker, before, place = SceneMonitor(), False, 0
     for index, (target, inverted, gain, offset) in enumerate(frames):
         inverted = inverted and index > 0
         place += int(np.clip(target - place, -3, 3))
         image = gain * scene(shift=place) + offset
         image = (-image if inverted else image).astype(np.float32)
-        changed = tracker.observe(image, *np.percentile(image, (1, 99)))
-        assert changed == (inverted != before)
+        change = tracker.observe(image, *np.percentile(image, (1, 99)))
+        assert change == SceneChange(switched=inverted != before)
         assert tracker.inverted == inverted
         before = inverted
 
 
 def test_flat_frames_and_other_scenes_switch_nothing():
-    tracker = PolarityTracker()
-    assert not tracker.observe(scene().astype(np.float32), 7000, 7600)
-    assert not tracker.observe(np.full(SHAPE, 7000, np.float32), 7000, 7001)
+    tracker = SceneMonitor()
+    assert tracker.observe(scene().astype(np.float32), 7000, 7600) == SceneChange()
+    assert tracker.observe(np.full(SHAPE, 7000, np.float32), 7000, 7001) == SceneChange()
     for seed in range(1, 6):
-        assert not tracker.observe(scene(seed).astype(np.float32), 7000, 7600)
+        assert not tracker.observe(scene(seed).astype(np.float32), 7000, 7600).switched
     # The flat frame was not taken as the scene to compare with.
     tracker.observe(np.full(SHAPE, 7000, np.float32), 7000, 7001)
-    assert tracker.observe((14600 - scene(5)).astype(np.float32), 7000, 7600)
+    assert tracker.observe((14600 - scene(5)).astype(np.float32), 7000, 7600).switched
+
+
+def test_cut_to_another_scene_is_seen_once():
+    tracker = SceneMonitor()
+    images = [scene(seed).astype(np.float32) for seed in (0, 0, 3, 3, 3)]
+    changes = [tracker.observe(image, *np.percentile(image, (1, 99))) for image in images]
+    assert [change.cut for change in changes] == [False, False, True, False, False]
 
 
 @given(low_share=st.floats(0, 10), high_share=st.floats(90, 100))
