@@ -35,9 +35,11 @@ _PATCH = 32
 
 class Salience:
     """
-    Signal-to-clutter ratio over the whole image: how far a window the size of the target differs
-    from the ring around it, over the standard deviation in that ring. It tells where a thermal
-    target may be, whatever it looks like, at the price of a few box filters.
+    Signal-to-clutter ratio over the whole image.
+
+    It says how far a window of the target's size differs from the ring around it, over the
+    standard deviation in that ring. That tells where a thermal target may be, whatever it looks
+    like, at the price of a few box filters.
 
     Parameters
     ----------

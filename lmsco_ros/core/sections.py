@@ -281,6 +281,9 @@ class ScaleConfig:
         Range of the exponents of `step`.
     learning_rate : float
         Of the scale filter, which learns in the frames in which the filter is trained.
+    slow_rate, slow_share : float
+        Learning rate of the scale filter that holds on to the first frames, and its share in
+        the response.
     model_area : float
         Area of a scale sample in pixels.
     padding : float
@@ -297,6 +300,8 @@ class ScaleConfig:
     exponent_min: int = -8
     exponent_max: int = 8
     learning_rate: float = 0.12
+    slow_rate: float = 0.01
+    slow_share: float = 0.0
     model_area: float = 512.0
     padding: float = 1.0
     regularization: float = 0.01
@@ -309,6 +314,8 @@ class ScaleConfig:
         check_range(self, 'exponent_min', -50, 0)
         check_range(self, 'exponent_max', 0, 50)
         check_range(self, 'learning_rate', 0, 1)
+        check_range(self, 'slow_rate', 0, 1)
+        check_range(self, 'slow_share', 0, 1)
         check_range(self, 'model_area', 64, 65536)
         check_range(self, 'padding', 1, 4)
         check_range(self, 'regularization', 0, 100, open_low=True)

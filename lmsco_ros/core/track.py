@@ -208,7 +208,8 @@ class Track:
         count = self._config.confidence.candidates
         if not count:
             return []
-        found = self._salience.candidates(view, expected, _TURNS * count, _CUT_SCALES if self._monitor.after_cut else (1.0,))
+        scales = _CUT_SCALES if self._monitor.after_cut else (1.0,)
+        found = self._salience.candidates(view, expected, _TURNS * count, scales)
         first = self._pursuit.misses % _TURNS * count
         return found[first:first + count]
 
