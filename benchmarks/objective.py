@@ -33,6 +33,7 @@ from typing import Any
 from unittest.mock import patch
 
 from matplotlib.figure import Figure
+from matplotlib.ticker import LogLocator, NullLocator
 import numpy as np
 
 from benchmarks.measurement import load_config, markdown_table, positive
@@ -51,6 +52,7 @@ LOSSES: dict[str, dict[str, Any]] = {
 }
 CONVERGED = {'iterations': 30, 'gradient_steps': 2, 'update_interval': 1}
 PAPER = {'iterations': 3, 'gradient_steps': 2, 'update_interval': 5}
+_TICKS = (1, 1.2, 1.5, 2, 3, 5, 7)
 
 
 @dataclass(frozen=True)
@@ -98,7 +100,9 @@ def budgets(config: LearningConfig) -> list[Budget]:
 
 def _describe(budget: dict[str, int]) -> str:
     """Return a budget in words."""
-    return '{iterations} x {gradient_steps} steps every {update_interval}'.format(**budget)
+    interval = budget['update_interval']
+    return (f'{budget["iterations"]} x {budget["gradient_steps"]} steps every '
+            f'{"frame" if interval == 1 else f"{interval} frames"}')
 
 
 def record_lesson(config: TrackerConfig, clip: Clip) -> Lesson:
@@ -174,21 +178,41 @@ def objective_table(values: dict[tuple[str, str], np.ndarray]) -> str:
                            '90th percentile', 'highest'), rows)
 
 
-def draw(values: dict[tuple[str, str], np.ndarray], frames: Sequence[int], title: str,
-         path: Path) -> None:
-    """Write a picture with axes for each loss and a line for each budget."""
+def draw(values: dict[tuple[str, str], np.ndarray], numbers: Sequence[int], frames: int,
+         title: str, path: Path) -> None:
+    """
+    Write a picture with axes for each loss and a line for each budget.
+
+    Parameters
+    ----------
+    values : dict of ndarray, shape (n,)
+        As `compare` returns them.
+    numbers : sequence of int
+        Frame of each sample; lines have gaps where none was stored.
+    frames : int
+        Number of the last frame.
+    title : str
+        What was followed.
+    path : Path
+        Of the picture.
+
+    """
     figure = Figure(figsize=(10, 3.6), dpi=110, layout='constrained')
-    columns = figure.subplots(1, len(LOSSES), sharey=True)
-    shown = [budget for budget in dict.fromkeys(budget for _, budget in values)
-             if budget != _describe(CONVERGED)]
+    columns = figure.subplots(1, len(LOSSES), sharex=True, sharey=True)
+    converged = _describe(CONVERGED)
+    shown = {budget for _, budget in values} - {converged}
     for axes, loss in zip(columns, LOSSES):
-        style_axes(axes, f'{title}: {loss}' if axes is columns[0] else loss, 'frame',
-                   'objective over converged' if axes is columns[0] else '')
-        axes.axhline(1, color='black', linewidth=1, label=_describe(CONVERGED))
-        for budget, look in looks(shown).items():
-            axes.plot(frames, values[loss, budget] / values[loss, _describe(CONVERGED)],
-                      color=look.color, linewidth=1, label=budget)
-        axes.set_yscale('log')
+        style_axes(axes, loss, 'frame', '')
+        axes.axhline(1, color='black', linewidth=1, label=converged)
+        for budget, look in looks(sorted(shown)).items():
+            ratio = np.full(frames + 1, np.nan)
+            ratio[numbers] = values[loss, budget] / values[loss, converged]
+            axes.plot(ratio, color=look.color, linewidth=1.2, label=budget)
+    columns[0].set_ylabel(f'objective over converged, {title}', fontsize=9)
+    columns[0].set_yscale('log')
+    columns[0].yaxis.set_major_locator(LogLocator(subs=_TICKS))
+    columns[0].yaxis.set_major_formatter('{x:g}')
+    columns[0].yaxis.set_minor_locator(NullLocator())
     columns[-1].legend(fontsize=8, frameon=False)
     path.parent.mkdir(parents=True, exist_ok=True)
     figure.savefig(path)
@@ -219,7 +243,7 @@ def main(arguments: list[str] | None = None) -> None:
     values = compare(lesson, config.learning)
     print(f'`{options.config}`, {clip.name}, {len(lesson.samples)} samples of '
           f'{len(clip.frames) - 1} frames\n\n{objective_table(values)}')
-    draw(values, list(lesson.samples), clip.name, options.output)
+    draw(values, list(lesson.samples), len(clip.frames) - 1, clip.name, options.output)
 
 
 if __name__ == '__main__':
