@@ -12,10 +12,11 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Frames to measure on, in memory: rendered, or scenes in which one thing can be varied."""
+"""Frames to measure on: rendered, recorded, or scenes in which one thing can be varied."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import islice
 
@@ -23,12 +24,14 @@ import cv2
 import numpy as np
 
 from lmsco_ros.core import BoundingBox
+from lmsco_ros.evaluation.geometry import is_absent
+from lmsco_ros.evaluation.session import Request, select_sequences
 from lmsco_ros.synthetic import render_scene, SceneConfig
 from lmsco_ros.synthetic.figures import bounds, Capsule, rasterize
 from lmsco_ros.synthetic.landscape import render_landscape
 from lmsco_ros.synthetic.sensor import Sensor
 
-__all__ = ['Clip', 'moving_scene', 'walking_scene']
+__all__ = ['Clip', 'moving_scene', 'recorded_clips', 'walking_scene']
 
 _PAN = 0.7
 _DRIVE = 1.5
@@ -71,6 +74,16 @@ def walking_scene(count: int) -> Clip:
     scene = list(islice(render_scene(SceneConfig(frames=max(count, SceneConfig.frames))), count))
     return Clip('rendered scene', [frame.image for frame in scene],
                 np.array([frame.box.as_tuple() for frame in scene]))
+
+
+def recorded_clips(request: Request) -> Iterator[Clip]:
+    """Yield the sequences of a request, each from the first frame that shows its target."""
+    for sequence in select_sequences(request).sequences:
+        start = int(np.argmin(is_absent(sequence.ground_truth)))
+        if len(sequence) - start > 1:
+            yield Clip(sequence.full_name,
+                       [sequence.frames[index] for index in range(start, len(sequence))],
+                       sequence.ground_truth[start:])
 
 
 def moving_scene(size: tuple[int, int], target: float, count: int, seed: int = 1) -> Clip:

@@ -27,8 +27,9 @@ python -m benchmarks.side_by_side --dataset FOLDER [--sequences PATTERN] [--fram
 from __future__ import annotations
 
 import argparse
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import islice
 from pathlib import Path
 
 import cv2
@@ -36,13 +37,13 @@ import numpy as np
 
 from benchmarks.measurement import (
     load_config, markdown_table, positive, PROCESSOR, take_turns, WALL)
-from benchmarks.scenes import Clip, walking_scene
+from benchmarks.scenes import Clip, recorded_clips, walking_scene
 from lmsco_ros.core import LMSCOError, TrackState
 from lmsco_ros.core.backend import limit_threads
 from lmsco_ros.evaluation.environment import machine
 from lmsco_ros.evaluation.errors import TrackerError
 from lmsco_ros.evaluation.geometry import is_absent, overlaps
-from lmsco_ros.evaluation.session import Request, select_sequences
+from lmsco_ros.evaluation.session import Request
 from lmsco_ros.evaluation.trackers import resolve
 from lmsco_ros.evaluation.trackers.configured import ConfiguredTracker
 from lmsco_ros.evaluation.trackers.interface import Answer, Tracker
@@ -99,17 +100,6 @@ def buildable(names: Sequence[str]) -> dict[str, Tracker]:
         except TrackerError as error:
             print(f'Left out: {error}.\n')
     return found
-
-
-def dataset_clips(options: argparse.Namespace) -> Iterator[Clip]:
-    """Yield the first frames of the sequences that the command line asks for."""
-    request = Request(options.dataset, options.sequences, options.frames)
-    for sequence in select_sequences(request).sequences[:options.limit]:
-        start = int(np.argmin(is_absent(sequence.ground_truth)))
-        if len(sequence) - start > 1:
-            yield Clip(sequence.full_name,
-                       [sequence.frames[index] for index in range(start, len(sequence))],
-                       sequence.ground_truth[start:])
 
 
 class Runner:
@@ -204,7 +194,9 @@ def main(arguments: list[str] | None = None) -> None:
     if options.reference and options.reference not in names:
         print(f'{options.reference} is not there to compare with; {names[-1]} takes its place.\n')
     reference = names.index(options.reference) if options.reference in names else len(names) - 1
-    clips = dataset_clips(options) if options.dataset else [walking_scene(options.frames)]
+    request = Request(options.dataset, options.sequences, options.frames)
+    clips = (islice(recorded_clips(request), options.limit) if options.dataset
+             else [walking_scene(options.frames)])
     races = [run_race(list(trackers.values()), clip, options.threads) for clip in clips]
     if not races:
         parser.exit(1, 'no sequence has two frames with a target\n')

@@ -14,6 +14,8 @@
 
 """The benchmarks measure what they say, and each of them runs."""
 
+from dataclasses import replace
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -26,6 +28,8 @@ from benchmarks.stages import TRAINING
 from lmsco_ros.core import TrackerConfig
 from lmsco_ros.core.backbones.weights import load_backbone
 from lmsco_ros.core.features.extractor import FeatureExtractor
+
+CONFIGURATIONS = Path(measurement.__file__).with_name('configurations')
 
 
 @pytest.fixture(scope='module')
@@ -204,3 +208,12 @@ def test_paper_cost_compares_with_the_bare_networks(capsys):
     printed = capsys.readouterr().out
     assert 'VGGM sees 10 x 1' in printed and 'MotionCNN sees 10 x 3' in printed
     assert float(printed.split('A frame takes ')[1].split()[0]) > 1
+
+
+@pytest.mark.parametrize('name, changes', [
+    ('ridge', {'core': 0}), ('coupled', {'anchor': 'coupled'})])
+def test_configurations_of_losses_change_the_loss_alone(name, changes):
+    """Whatever else differs would be compared with it."""
+    default = TrackerConfig.preset('default')
+    expected = replace(default, learning=replace(default.learning, **changes))
+    assert TrackerConfig.from_yaml(CONFIGURATIONS / f'{name}.yaml') == expected != default

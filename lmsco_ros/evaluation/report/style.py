@@ -48,6 +48,12 @@ def new_axes(title: str, x_label: str, y_label: str) -> tuple[Figure, Axes]:
     """Return a figure with one set of axes in the style of the report."""
     figure = Figure(figsize=_SIZE, dpi=150, layout='constrained')
     axes = figure.add_subplot()
+    style_axes(axes, title, x_label, y_label)
+    return figure, axes
+
+
+def style_axes(axes: Axes, title: str, x_label: str, y_label: str) -> None:
+    """Give axes the style of the report."""
     axes.set_title(title, fontsize=11, color=_TEXT, loc='left', fontweight='bold')
     axes.set_xlabel(x_label, fontsize=9, color=_TEXT)
     axes.set_ylabel(y_label, fontsize=9, color=_TEXT)
@@ -58,7 +64,6 @@ def new_axes(title: str, x_label: str, y_label: str) -> tuple[Figure, Axes]:
         axes.spines[side].set_visible(False)
     for side in ('left', 'bottom'):
         axes.spines[side].set_color('#aab2bd')
-    return figure, axes
 
 
 def legend(axes: Axes, place: str) -> None:
