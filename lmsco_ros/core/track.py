@@ -38,8 +38,8 @@ from lmsco_ros.core.verification import Verification
 
 __all__ = ['Track']
 
-# Frames in which all salient places get their turn.
-_TURNS = 4
+# Searches in which all salient places get their turn; odd, since later every other frame has one.
+_TURNS = 3
 
 # Sizes of the target that are considered after a cut.
 _CUT_SCALES = (1.0, 0.7, 1.4)
@@ -191,9 +191,13 @@ class Track:
         # A distractor has to be watched, or it gets away from its place and looks new.
         for place in self._distractors.places:
             self._is_distractor(self._detector(view, expected.moved_to(place)))
-        seen = [self._weigh(view, self._detector(view, box), box)
-                for box in self._candidates(view, expected)]
-        seen += self._search_tiles(view, expected, here.detection.region.width)
+        # In the long run they take turns, so that a frame without the target costs less.
+        hurry = self._frozen or self._monitor.state is not TrackState.LOST
+        seen = []
+        if hurry or self._pursuit.misses % 2 == 0:
+            seen += self._search_salient(view, expected)
+        if hurry or self._pursuit.misses % 2 == 1:
+            seen += self._search_tiles(view, expected, here.detection.region.width)
         seen.sort(key=lambda sighting: -self._monitor.score(sighting.evidence))
         least = self._monitor.score(here.evidence)
         for other in seen:
@@ -203,15 +207,16 @@ class Track:
                 return other
         return here
 
-    def _candidates(self, view: FrameView, expected: BoundingBox) -> list[BoundingBox]:
-        """Return the salient places whose turn it is."""
+    def _search_salient(self, view: FrameView, expected: BoundingBox) -> list[_Sighting]:
+        """Return what is at the salient places whose turn it is."""
         count = self._config.confidence.candidates
         if not count:
             return []
         scales = _CUT_SCALES if self._monitor.after_cut else (1.0,)
         found = self._salience.candidates(view, expected, _TURNS * count, scales)
         first = self._pursuit.misses % _TURNS * count
-        return found[first:first + count]
+        return [self._weigh(view, self._detector(view, box), box)
+                for box in found[first:first + count]]
 
     def _search_tiles(self, view: FrameView, expected: BoundingBox,
                       side: float) -> list[_Sighting]:

@@ -72,7 +72,7 @@ def test_target_that_jumps_where_nothing_was_is_followed(scene):
     assert results[-1].box.center == pytest.approx(elsewhere, abs=1.0)
 
 
-def test_target_of_another_view_is_found_at_once(scene, make_scene):
+def test_target_of_another_view_is_found_soon(scene, make_scene):
     other, elsewhere = make_scene((240, 160), 5), (START[0] + 110, START[1] + 40)
     tracker = started(scene, resting(scene))
     results = [tracker.update(resting(other, elsewhere)(n)) for n in range(6, 10)]
