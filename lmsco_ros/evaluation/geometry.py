@@ -30,6 +30,9 @@ import numpy.typing as npt
 
 Array = npt.NDArray[np.float64]
 
+# Sizes of the target that it moves by from one frame to the next when it jumps, not flies.
+_JUMP_SIZES = 2.0
+
 
 def clip_boxes(boxes: Array, size: tuple[int, int]) -> Array:
     """
@@ -98,6 +101,18 @@ def center_offsets(ground_truth: Array, boxes: Array) -> Array:
     offsets = (boxes[:, :2] + boxes[:, 2:] / 2) - (ground_truth[:, :2] + ground_truth[:, 2:] / 2)
     offsets = np.where(is_absent(boxes)[:, None], np.inf, offsets)
     return np.where(is_absent(ground_truth)[:, None], np.nan, offsets)
+
+
+def has_jumped(ground_truth: Array) -> npt.NDArray[np.bool_]:
+    """
+    Return for each row, shape (n,), whether the target has jumped there, as after a cut.
+
+    It has when its center moves by more than two of its sizes from one frame to the next.
+    """
+    centers = ground_truth[:, :2] + ground_truth[:, 2:] / 2
+    steps = np.linalg.norm(np.diff(centers, axis=0), axis=1)
+    sizes = np.sqrt(np.prod(ground_truth[:-1, 2:], axis=1))
+    return np.append(False, steps > _JUMP_SIZES * sizes)
 
 
 def is_absent(boxes: Array) -> npt.NDArray[np.bool_]:

@@ -19,7 +19,7 @@ import numpy as np
 import pytest
 
 from lmsco_ros.core import BoundingBox
-from lmsco_ros.evaluation.geometry import center_offsets, clip_boxes, overlaps
+from lmsco_ros.evaluation.geometry import center_offsets, clip_boxes, has_jumped, overlaps
 
 ABSENT = [np.nan] * 4
 
@@ -53,6 +53,11 @@ def test_center_offsets_point_from_truth_to_answer():
     offsets = center_offsets(truth, answers)
     assert offsets[0].tolist() == [3, 4]
     assert np.isinf(offsets[1]).all() and np.isnan(offsets[2]).all()
+
+
+def test_target_jumps_by_more_than_two_of_its_sizes():
+    truth = np.array([[0., 0, 4, 9], [11.9, 0, 4, 9], [24.0, 0, 4, 9], ABSENT, [90, 0, 4, 9]])
+    assert has_jumped(truth).tolist() == [False, False, True, False, False]
 
 
 side = st.floats(0.5, 50)

@@ -78,6 +78,15 @@ def test_supervised_figures_by_hand():
     assert bad.eao.value == pytest.approx((11 / 19 + .5) / 2)
 
 
+def test_failures_where_the_target_jumps_are_counted_apart():
+    truth = np.tile([10., 10, 10, 10], (20, 1))
+    truth[12:] += [60, 0, 0, 0]
+    cut = SequenceInfo('cut', 'group', (100, 100), truth, {})
+    run = EvaluationRun('vot', (cut,), {
+        'one': (trace([1] * 20, (0, 8, 17), (3, 12)),), 'other': (trace([1] * 20),)})
+    assert [summary.at_jumps for summary in summarize_supervised(run)] == [1, 0]
+
+
 def test_python_convention_forgets_what_comes_after_the_longest_fragment():
     overlaps = [1] * 5 + [0] * 5
     run = EvaluationRun('vot', (sequence('a', 40),), {

@@ -22,7 +22,7 @@ from typing import Optional, Sequence
 import numpy as np
 import numpy.typing as npt
 
-from lmsco_ros.evaluation.geometry import Array, is_absent
+from lmsco_ros.evaluation.geometry import Array, has_jumped, is_absent
 from lmsco_ros.evaluation.trace import Trace
 
 Flags = npt.NDArray[np.bool_]
@@ -31,8 +31,6 @@ GOOD_OVERLAP = 0.5
 
 # Frames after its return in which a target counts as found again.
 RETURN_FRAMES = 30
-# Sizes of the target that it moves by from one frame to the next when it jumps, not flies.
-_JUMP_SIZES = 2.0
 
 
 @dataclass(frozen=True)
@@ -205,9 +203,7 @@ def _outcome(claimed: Flags, overlap: Array) -> tuple[Optional[int], bool]:
 def _returns(ground_truth: Array, started: Flags) -> list[int]:
     """Return the first frame of each return that lasts long enough."""
     absent = is_absent(ground_truth)
-    centers = ground_truth[:, :2] + ground_truth[:, 2:] / 2
-    steps = np.linalg.norm(np.diff(centers, axis=0), axis=1)
-    jumped = steps > _JUMP_SIZES * np.sqrt(np.prod(ground_truth[:-1, 2:], axis=1))
+    jumped = has_jumped(ground_truth)[1:]
     starts = np.flatnonzero(started[1:] & ~absent[1:] & (absent[:-1] | jumped)) + 1
     ends = np.append(starts[1:], len(absent))
     return [int(start) for start, end in zip(starts, ends)

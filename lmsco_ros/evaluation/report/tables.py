@@ -118,6 +118,7 @@ def supervised_table(summaries: Sequence[SupervisedSummary]) -> Table:
         _Column('EAO (Python toolkit)', lambda item: item.eao_python),
         _Column('accuracy', lambda item: item.accuracy),
         _Column('failures', lambda item: _plain(item.failures.sum()), 0, -1),
+        _Column('of these at jumps', lambda item: _plain(item.at_jumps), 0, 0),
         _Column('failures per sequence', lambda item: item.failures_per_sequence, 2, -1),
         _Column('failures per 100 frames', lambda item: item.failures_per_100_frames, 2, -1),
         _Column('reliability', lambda item: item.reliability),

@@ -20,7 +20,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from lmsco_ros.evaluation.geometry import Array
+from lmsco_ros.evaluation.geometry import Array, has_jumped
 from lmsco_ros.evaluation.protocols.bootstrap import (
     Estimate, estimate, mean_estimate, ratio_estimate)
 from lmsco_ros.evaluation.protocols.expected_overlap import (
@@ -42,6 +42,8 @@ class SupervisedSummary:
         Name.
     accuracies, failures : ndarray, shape (sequences,)
         Accuracy and number of failures of each sequence.
+    at_jumps : int
+        Failures in frames in which the target jumps, as after a cut: nobody can follow there.
     accuracy : Estimate
         Mean over sequences weighted by their length, as in the VOT toolkit.
     failures_per_sequence, failures_per_100_frames : Estimate
@@ -62,6 +64,7 @@ class SupervisedSummary:
     tracker: str
     accuracies: Array
     failures: Array
+    at_jumps: int
     accuracy: Estimate
     failures_per_sequence: Estimate
     failures_per_100_frames: Estimate
@@ -117,6 +120,7 @@ def _summarize(run: EvaluationRun, name: str,
     ours = longest_fragment([fragment for part in parts for fragment in part])
     return SupervisedSummary(
         tracker=name, accuracies=accuracies, failures=failures,
+        at_jumps=_failures_at_jumps(run, name),
         accuracy=ratio_estimate(accuracies * lengths, lengths),
         failures_per_sequence=mean_estimate(failures),
         failures_per_100_frames=Estimate(100 * rate.value, 100 * rate.low, 100 * rate.high),
@@ -126,6 +130,11 @@ def _summarize(run: EvaluationRun, name: str,
         curve=curve, eao=eao,
         eao_python=_expected_overlap(parts, ours, eao_interval(run))[1],
         crashes=run.crashes(name))
+
+
+def _failures_at_jumps(run: EvaluationRun, name: str) -> int:
+    return sum(int(has_jumped(sequence.ground_truth)[list(trace.failures)].sum())
+               for sequence, trace in zip(run.sequences, run.traces[name]))
 
 
 def _expected_overlap(parts: list[list[Fragment]], length: int,
