@@ -26,8 +26,9 @@ from lmsco_ros.core.types import BoundingBox
 
 __all__ = ['Salience']
 
-# Side of the target in the image that is searched, in pixels; larger ones are reduced to it.
+# The image is reduced for the search, to this side of the target and this many pixels at most.
 _SIDE = 10.0
+_PIXELS = 100_000
 # Standard deviation below which surroundings count as even, in the working range.
 _EVEN = 0.01
 _PATCH = 32
@@ -71,7 +72,7 @@ class Salience:
             Sizes to look for, relative to `box`.
 
         """
-        shrink = min(1.0, _SIDE / box.area**0.5)
+        shrink = min(1.0, _SIDE / box.area**0.5, (_PIXELS / (view.size[0] * view.size[1]))**0.5)
         size = max(1, round(shrink * view.size[0])), max(1, round(shrink * view.size[1]))
         pixels = view.patch(BoundingBox(0, 0, *view.size), size)
         step = view.size[0] / size[0], view.size[1] / size[1]
