@@ -47,7 +47,7 @@ class _MinMax:
         """Return the range of all numbers of a frame."""
         values = image[np.isfinite(image)] if image.dtype.kind == 'f' else image
         low, high = float(values.min()), float(values.max())
-        return FrameCondition(IntensityRange(low, max(high, low + 1)), False, False)
+        return FrameCondition(IntensityRange(low, max(high, low + 1)), False, False, False)
 
 
 class _FirstRange:
@@ -60,7 +60,7 @@ class _FirstRange:
     def examine(self, image: npt.NDArray) -> FrameCondition:
         """Return the range of the first frame."""
         self._range = self._range or self._gain.observe(image)
-        return FrameCondition(self._range, False, False)
+        return FrameCondition(self._range, False, False, False)
 
 
 class _PlainTracker(ConfiguredTracker):

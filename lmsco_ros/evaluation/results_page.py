@@ -61,11 +61,11 @@ _SUPERVISED_NOTE = """\
 Started again five frames after each frame without overlap. Accuracy without the ten
 frames after each start, weighted by sequence length; reliability is the chance to
 survive 30 frames. At a jump the target moves by more than two of its sizes in one frame,
-mostly because the recording is cut: nobody can follow there. EAO is the mean of the
-expected-overlap curve over sequence lengths of {low} to {high} frames, the curve followed
-to the longest sequence (MATLAB toolkit). The figure of the Python toolkit, whose curve
-ends at the tracker's own longest fragment and which so overrates trackers that fail
-early, stands beside it.
+mostly because the recording is cut: a search near the last place must fail there. EAO is
+the mean of the expected-overlap curve over sequence lengths of {low} to {high} frames, the
+curve followed to the longest sequence (MATLAB toolkit). The figure of the Python toolkit,
+whose curve ends at the tracker's own longest fragment and which so overrates trackers that
+fail early, stands beside it.
 """
 
 _CONFIDENCE_NOTE = """\

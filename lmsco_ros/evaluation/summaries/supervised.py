@@ -43,7 +43,7 @@ class SupervisedSummary:
     accuracies, failures : ndarray, shape (sequences,)
         Accuracy and number of failures of each sequence.
     at_jumps : int
-        Failures in frames in which the target jumps, as after a cut: nobody can follow there.
+        Failures in frames in which the target jumps, as after a cut.
     accuracy : Estimate
         Mean over sequences weighted by their length, as in the VOT toolkit.
     failures_per_sequence, failures_per_100_frames : Estimate
