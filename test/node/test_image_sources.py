@@ -65,6 +65,8 @@ def diagnosis_with(graph, health, word):
     return diagnosis
 
 
+# On a busy machine /rosout itself is sometimes never discovered, which is not what is tested.
+@pytest.mark.flaky(reruns=2)
 def test_incompatible_publisher_is_named_at_once_and_in_the_diagnostics(graph, camera):
     log = graph.listen(Log, '/rosout')
     graph.start_tracker(image_reliability='reliable', no_image_timeout=3600.0)
