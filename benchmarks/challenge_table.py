@@ -28,6 +28,7 @@ from collections.abc import Sequence
 from pathlib import Path
 import re
 
+from benchmarks.measurement import markdown_table
 from lmsco_ros.evaluation.challenges import CHALLENGES
 from lmsco_ros.evaluation.errors import DatasetError
 from lmsco_ros.evaluation.report.formatting import interval, NONE, number
@@ -58,12 +59,10 @@ def challenge_table(folders: Sequence[Path]) -> str:
     """
     parts = [part for folder in folders for part in confidence_parts(_run(folder))]
     order = ['', *CHALLENGES]
-    lines = ['| ' + ' | '.join(COLUMNS) + ' |', '|' + '---|' * len(COLUMNS)]
-    for name, run in sorted(parts, key=lambda part: order.index(part[0])):
-        lines += ['| ' + ' | '.join([_case(name), str(len(run.sequences)), *figures]) + ' |'
-                  for figures in map(_figures, summarize_one_pass(run),
-                                     summarize_confidence(run))]
-    return '\n'.join(lines) + '\n'
+    return markdown_table(COLUMNS, [
+        (_case(name), len(run.sequences), *_figures(accuracy, word))
+        for name, run in sorted(parts, key=lambda part: order.index(part[0]))
+        for accuracy, word in zip(summarize_one_pass(run), summarize_confidence(run))])
 
 
 def insert(page: str, name: str, table: str) -> str:
@@ -80,7 +79,7 @@ def insert(page: str, name: str, table: str) -> str:
     pattern = re.compile(f'{re.escape(begin)}.*?{re.escape(end)}', re.DOTALL)
     if not pattern.search(page):
         raise ValueError(f'the page has no {begin} ... {end}')
-    return pattern.sub(lambda _: f'{begin}\n{table}{end}', page)
+    return pattern.sub(lambda _: f'{begin}\n{table}\n{end}', page)
 
 
 def _run(folder: Path) -> EvaluationRun:

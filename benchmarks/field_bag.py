@@ -35,12 +35,12 @@ from pathlib import Path
 import numpy as np
 from rclpy.serialization import serialize_message
 from rosbags.typesys import get_typestore, Stores
-from std_msgs.msg import Header
 
 from benchmarks.challenge_table import insert
 from benchmarks.field_answers import Answers, in_parts, read_answers, write_answers
 from benchmarks.field_sheet import draw_sheet
 from benchmarks.joined_recording import join, Part, read_truth, stamp_of, write_truth
+from benchmarks.measurement import markdown_table
 from lmsco_ros.evaluation.report.formatting import NONE, number
 from lmsco_ros.evaluation.run_file import EvaluationRun, SequenceInfo
 from lmsco_ros.evaluation.session import Request, select_sequences
@@ -48,6 +48,7 @@ from lmsco_ros.evaluation.summaries.confidence import summarize_confidence
 from lmsco_ros.replay.bag_images import RAW
 from lmsco_ros.replay.bag_maker import create_bag, image_message
 from lmsco_ros.replay.bag_replay import MARKS_TOPIC, replay_bag, ReplayPlan
+from lmsco_ros.replay.headers import header_at
 from lmsco_ros.replay.player import Exchange
 from lmsco_ros.replay.storage import Storage
 from msg_adapters.boxes import polygon_from_box
@@ -79,8 +80,7 @@ def write_bag(parts: Sequence[Part], path: Path) -> None:
 
 def _mark(part: Part, stamp: int) -> bytes:
     """Return the message that starts the target of a part."""
-    header = Header(frame_id='thermal_camera')
-    header.stamp.sec, header.stamp.nanosec = divmod(stamp, 10 ** 9)
+    header = header_at(stamp, 'thermal_camera')
     return serialize_message(polygon_from_box(part.mark.as_tuple(), header))
 
 
@@ -125,7 +125,7 @@ def event_table(parts: Sequence[SequenceInfo], answers: Sequence[Answers]) -> st
     groups = [(name, [index for index, part in enumerate(parts) if part.challenge == event])
               for event, name in EVENT_NAMES.items() if event in events]
     groups.append(('**in all**', list(range(len(parts)))))
-    return _table('event', [
+    return markdown_table(('event', *COLUMNS), [
         [f'{name} ({len(chosen)} parts)',
          *figures([parts[index] for index in chosen], [answers[index] for index in chosen])]
         for name, chosen in groups])
@@ -133,14 +133,9 @@ def event_table(parts: Sequence[SequenceInfo], answers: Sequence[Answers]) -> st
 
 def part_table(parts: Sequence[SequenceInfo], answers: Sequence[Answers]) -> str:
     """Return the figures for each part as a Markdown table."""
-    return _table('part', [
+    return markdown_table(('part', *COLUMNS), [
         [f'{part.full_name}, {EVENT_NAMES[part.challenge]}', *figures([part], [answer])]
         for part, answer in zip(parts, answers)])
-
-
-def _table(first: str, rows: Sequence[Sequence[str]]) -> str:
-    lines = [[first, *COLUMNS], ['---'] * (len(COLUMNS) + 1), *rows]
-    return ''.join(f'| {" | ".join(line)} |\n' for line in lines)
 
 
 def _options() -> argparse.Namespace:
@@ -181,7 +176,7 @@ def main() -> None:
             'overlay_interval': options.overlay_interval}), answered)
     answers = list(in_parts(parts, read_answers(answered)))
     events = event_table(parts, answers)
-    text = f'{events}\n{part_table(parts, answers)}'
+    text = f'{events}\n\n{part_table(parts, answers)}\n'
     (output / 'report.md').write_text(text, encoding='utf-8')
     print(text)
     if options.page is not None:

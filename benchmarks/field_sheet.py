@@ -30,6 +30,7 @@ from rosbags.highlevel import AnyReader
 
 from benchmarks.field_answers import Answers
 from benchmarks.joined_recording import FRAMES_PER_SECOND, stamp_of
+from lmsco_ros.evaluation.challenges.sensor import SHUTTER_EVERY, SHUTTER_FRAMES
 from lmsco_ros.evaluation.geometry import is_absent
 from lmsco_ros.evaluation.run_file import SequenceInfo
 from lmsco_ros.replay.bag_images import open_bag, serialized_stamp
@@ -41,7 +42,7 @@ _OVERLAY = '/lmsco_tracker/overlay'
 _PARTS_PER_EVENT = 2
 _SHOWN = 240, 192
 _RIM = 4
-_SHUTTER_OPENS = 72
+_SHUTTER_OPENS = SHUTTER_EVERY + SHUTTER_FRAMES
 
 
 @dataclass(frozen=True)
@@ -71,10 +72,10 @@ def chosen_moments(part: SequenceInfo) -> list[Moment]:
     """Return what is worth a look in a part: nothing where nothing happens."""
     last = len(part.ground_truth) - 1
     if part.challenge == 'shutter' and last > _SHUTTER_OPENS:
-        after = _SHUTTER_OPENS + 12
-        return [Moment('start', 0, 30), Moment('before', 48, 59), Moment('shutter closed', 61, 71),
-                Moment('open again', _SHUTTER_OPENS, min(after - 1, last)),
-                Moment('later', min(after + 18, last), last)]
+        return [Moment('start', 0, 30), Moment('before', SHUTTER_EVERY - 12, SHUTTER_EVERY - 1),
+                Moment('shutter closed', SHUTTER_EVERY + 1, _SHUTTER_OPENS - 1),
+                Moment('open again', _SHUTTER_OPENS, min(_SHUTTER_OPENS + 11, last)),
+                Moment('later', min(_SHUTTER_OPENS + 30, last), last)]
     absent = np.flatnonzero(is_absent(part.ground_truth))
     if not part.challenge.startswith('disappear') or not len(absent):
         return []

@@ -50,6 +50,7 @@ from rclpy.node import Node
 from sensor_msgs.msg import Image
 
 from lmsco_ros.core import BoundingBox
+from lmsco_ros.replay.headers import header_at
 from lmsco_ros.synthetic import render_scene, SceneConfig
 from msg_adapters.boxes import polygon_from_box
 from msg_adapters.image import message_from_image
@@ -122,7 +123,7 @@ class Camera(Node):
         """Send a frame, with a box to start on if need be, and return the answer."""
         image, box = self._film[number % len(self._film)]
         stamp = (number + 1) * PERIOD_NS
-        image.header.stamp.sec, image.header.stamp.nanosec = divmod(stamp, 10 ** 9)
+        image.header = header_at(stamp)
         if start:
             self._starts.publish(polygon_from_box(_visible(box, image).as_tuple(), image.header))
         self._images.publish(image)

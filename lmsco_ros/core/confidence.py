@@ -63,11 +63,9 @@ def peak_to_sidelobe_ratio(grid: np.ndarray, exclude: int) -> float:
 _USUAL_PRESENCE = 4.0
 _USUAL_RATE = 0.03
 
-# After a cut the target is likely to be somewhere in the picture, and looks different: parts of
-# the thresholds that it has to reach, and log-odds of presence that it may lack.
-_CUT_PARTS = 0.5
-_CUT_PRESENCE = -2.0
-_CUT_FOUND = 0.8
+# After a cut the target is likely to be somewhere in the picture, and looks different: score and
+# part of the other thresholds that it has to reach, and its least log-odds of presence.
+_AFTER_CUT = (0.8, 0.5, -2.0)
 
 
 @dataclass(frozen=True)
@@ -160,12 +158,11 @@ class ConfidenceMonitor:
         Filter, first filter and comparison must agree, each of them; less so after a cut.
         """
         presence = self.presence(evidence)
-        part = _CUT_PARTS if self._cut else 1.0
-        found = min(self.config.found, _CUT_FOUND) if self._cut else self.config.found
-        return (self.score(evidence) >= found
+        found, part, present = _AFTER_CUT if self._cut else (1.0, 1.0, 0.0)
+        return (self.score(evidence) >= min(self.config.found, found)
                 and self.quality(evidence.sharpness) >= part * self.config.sharp
                 and evidence.likeness >= part * self.config.alike
-                and (presence is None or presence >= (_CUT_PRESENCE if self._cut else 0.0)))
+                and (presence is None or presence >= present))
 
     def cut(self) -> None:
         """Take note that the view has changed: the target has to be found again."""

@@ -25,13 +25,10 @@ from lmsco_ros.core.errors import ImageError
 from lmsco_ros.core.probe import (
     credible_values, is_frozen, percentiles, SceneMonitor, take_probe, to_gray)
 
-__all__ = ['AutomaticGain', 'check_image', 'FrameCondition', 'IntensityRange', 'measured',
-           'to_gray']
+__all__ = ['AutomaticGain', 'check_image', 'FrameCondition', 'IntensityRange', 'to_gray']
 
 _SMALLEST_SIDE = 8
 
-# No sensor counts as far; the largest numbers that there are stand for pixels without a value.
-_LARGEST = 1e12
 # Below this the inverse of a range is no number any more.
 _NARROWEST = 1e-30
 
@@ -110,22 +107,6 @@ def check_image(image: np.ndarray) -> None:
     if min(image.shape[:2]) < _SMALLEST_SIDE:
         raise ImageError(f'the image has {image.shape[1]} x {image.shape[0]} pixels; '
                          f'expected at least {_SMALLEST_SIDE} in each direction')
-
-
-def measured(image: np.ndarray) -> np.ndarray:
-    """
-    Return a frame with NaN in place of numbers that no camera measures.
-
-    Parameters
-    ----------
-    image : ndarray
-        A frame; it is returned itself unless it has floating-point numbers beyond 1e12.
-
-    """
-    if image.dtype.kind != 'f':
-        return image
-    beyond = np.abs(image) > _LARGEST
-    return np.where(beyond, image.dtype.type(np.nan), image) if beyond.any() else image
 
 
 class AutomaticGain:

@@ -21,10 +21,13 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-__all__ = ['credible_values', 'is_frozen', 'percentiles', 'SceneChange', 'SceneMonitor',
-           'take_probe', 'to_gray', 'without_dead_pixels']
+__all__ = ['credible_values', 'is_frozen', 'measured', 'percentiles', 'SceneChange',
+           'SceneMonitor', 'take_probe', 'to_gray', 'without_dead_pixels']
 
 _PROBE_POINTS = 8192
+
+# No sensor counts as far; the largest numbers that there are stand for pixels without a value.
+_LARGEST = 1e12
 
 # Consecutive frames of real sequences, camera in motion or not, correlate above -0.02, and
 # mostly above 0.8: an inverted one lies far on the other side.
@@ -48,6 +51,23 @@ def to_gray(pixels: np.ndarray) -> np.ndarray:
     return pixels if pixels.ndim == 2 else cv2.cvtColor(pixels, cv2.COLOR_BGR2GRAY)
 
 
+def measured(pixels: np.ndarray) -> np.ndarray:
+    """
+    Return pixels with NaN in place of numbers that no camera measures.
+
+    Parameters
+    ----------
+    pixels : ndarray
+        Of a frame; they are returned themselves unless there are floating-point numbers beyond
+        1e12 among them.
+
+    """
+    if pixels.dtype.kind != 'f':
+        return pixels
+    beyond = np.abs(pixels) > _LARGEST
+    return np.where(beyond, pixels.dtype.type(np.nan), pixels) if beyond.any() else pixels
+
+
 def take_probe(image: np.ndarray) -> np.ndarray:
     """
     Return the frame seen through every n-th pixel in both directions.
@@ -64,7 +84,7 @@ def take_probe(image: np.ndarray) -> np.ndarray:
 
     """
     step = _step(image)
-    return to_gray(np.ascontiguousarray(image[step // 2::step, step // 2::step]))
+    return measured(to_gray(np.ascontiguousarray(image[step // 2::step, step // 2::step])))
 
 
 def percentiles(values: np.ndarray, shares: tuple[float, ...]) -> list[float]:
@@ -244,7 +264,7 @@ def _neighbors(image: np.ndarray, shape: tuple[int, ...], down: int, right: int)
     if start == 0:
         image, start = cv2.copyMakeBorder(image, 1, 1, 1, 1, cv2.BORDER_REFLECT_101), 1
     pixels = np.ascontiguousarray(image[start + down::step, start + right::step])
-    pixels = to_gray(pixels[:shape[0], :shape[1]])
+    pixels = measured(to_gray(pixels[:shape[0], :shape[1]]))
     # The last pixels of the probe may lie on the border of the image.
     missing = shape[0] - pixels.shape[0], shape[1] - pixels.shape[1]
     return cv2.copyMakeBorder(pixels, 0, missing[0], 0, missing[1], cv2.BORDER_REPLICATE)

@@ -46,7 +46,6 @@ class Pursuit:
         self._tiles = tiles
         self._last: _Point | None = None
         self._velocity = (0.0, 0.0)
-        self._ahead = 0.0
         self._order: list[_Point] = []
         self._next = 0
         self._misses = 0
@@ -58,13 +57,13 @@ class Pursuit:
 
     def seen(self, center: _Point) -> None:
         """Take note of where the target is in this frame."""
-        if self._last is not None and not self._ahead:
+        if self._last is not None and not self._misses:
             step = (center[0] - self._last[0], center[1] - self._last[1])
             self._velocity = (self._velocity[0] + _SMOOTHING * (step[0] - self._velocity[0]),
                               self._velocity[1] + _SMOOTHING * (step[1] - self._velocity[1]))
-        elif self._ahead:
+        elif self._misses:
             self._velocity = (0.0, 0.0)
-        self._last, self._ahead, self._order, self._misses = center, 0.0, [], 0
+        self._last, self._order, self._misses = center, [], 0
 
     def cut(self) -> None:
         """Take note that the view has changed: the target does not go on as it did."""
@@ -72,7 +71,6 @@ class Pursuit:
 
     def missed(self) -> None:
         """Take note of a frame in which the target was not seen."""
-        self._ahead = 1 + _DAMPING * self._ahead
         self._misses += 1
 
     def expected(self, box: BoundingBox, image_size: tuple[int, int]) -> BoundingBox:
@@ -87,7 +85,8 @@ class Pursuit:
             Width and height in pixels.
 
         """
-        x, y = (min(max(c + self._ahead * v, 0.0), float(length)) for c, v, length in zip(
+        ahead = (1 - _DAMPING**self._misses) / (1 - _DAMPING)
+        x, y = (min(max(c + ahead * v, 0.0), float(length)) for c, v, length in zip(
             box.center, self._velocity, image_size, strict=True))
         return box.moved_to((x, y))
 

@@ -25,7 +25,7 @@ import numpy as np
 from lmsco_ros.core.config import SamplingConfig
 from lmsco_ros.core.errors import BoxError
 from lmsco_ros.core.intensity import IntensityRange, to_gray
-from lmsco_ros.core.probe import without_dead_pixels
+from lmsco_ros.core.probe import measured, without_dead_pixels
 from lmsco_ros.core.types import BoundingBox
 
 __all__ = ['FrameView', 'check_box', 'clamp_box', 'patch_size', 'region_around', 'search_tiles',
@@ -83,13 +83,13 @@ class FrameView:
         factor = (max(1, int(step[0])), max(1, int(step[1])))
         x0, x1 = _covering_span(region.x, region.width, self.size[0], factor[0])
         y0, y1 = _covering_span(region.y, region.height, self.size[1], factor[1])
-        pixels = without_dead_pixels(to_gray(self.image[y0:y1, x0:x1]),
+        pixels = without_dead_pixels(measured(to_gray(self.image[y0:y1, x0:x1])),
                                      abs(self.intensity.high - self.intensity.low))
         if factor != (1, 1):
             pixels = _average(pixels, factor)
         values = self.intensity.normalize(pixels.astype(np.float32, copy=False))
         if self.image.dtype == np.float32:
-            values = np.nan_to_num(values, copy=False, nan=0.0, posinf=1.0, neginf=0.0)
+            values = np.nan_to_num(values, copy=False)
         start = ((region.x + step[0] / 2 - x0) / factor[0] - 0.5,
                  (region.y + step[1] / 2 - y0) / factor[1] - 0.5)
         inverse = np.array([[step[0] / factor[0], 0, start[0]],

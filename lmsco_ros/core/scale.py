@@ -103,44 +103,6 @@ class ScaleSearch(FixedScale):
         return _best_factor(self._config, values) if len(values) > 1 else 1.0
 
 
-class _Ridge:
-    """
-    Ridge regression of a label over the scales, solved per frequency, averaged over time.
-
-    Parameters
-    ----------
-    label : ndarray, shape (n // 2 + 1,)
-        Spectrum of the label over n scales.
-    rate : float
-        Part of the way to each new sample.
-    regularization : float
-        Ridge term.
-
-    """
-
-    def __init__(self, label: np.ndarray, rate: float, regularization: float) -> None:
-        self._label = np.conj(label)[:, None]
-        self._rate = np.float32(rate)
-        self._regularization = np.float32(regularization)
-        self._learned = False
-        self._numerator = np.zeros(1, np.complex64)
-        self._denominator = np.zeros(1, np.float32)
-
-    def learn(self, spectrum: np.ndarray) -> None:
-        """Average a sample (n // 2 + 1, d) into the filter."""
-        numerator = spectrum * self._label
-        denominator = vecdot(spectrum, spectrum).real / spectrum.shape[1]
-        rate = self._rate if self._learned else np.float32(1)
-        self._numerator = self._numerator + rate * (numerator - self._numerator)
-        self._denominator = self._denominator + rate * (denominator - self._denominator)
-        self._learned = True
-
-    def response(self, spectrum: np.ndarray) -> np.ndarray:
-        """Return the spectrum (n // 2 + 1,) of the response to a sample."""
-        return (vecdot(self._numerator, spectrum) / spectrum.shape[1]
-                / (self._denominator + self._regularization))
-
-
 class ScaleFilter(FixedScale):
     """
     One-dimensional correlation filter over scale (Danelljan et al., DSST, BMVC 2014).
@@ -164,9 +126,12 @@ class ScaleFilter(FixedScale):
         factors = np.array(scale_factors(config))
         offsets = np.arange(config.exponent_min, config.exponent_max + 1)
         label = np.exp(-0.5 * (offsets / config.label_sigma)**2)
-        spectrum = scipy.fft.rfft(label.astype(np.float32))
-        self._fast, self._slow = (_Ridge(spectrum, rate, config.regularization)
-                                  for rate in (config.learning_rate, config.slow_rate))
+        self._label = np.conj(scipy.fft.rfft(label.astype(np.float32)))[:, None]
+        self._rates = np.array([config.learning_rate, config.slow_rate], np.float32)[:, None]
+        self._shares = np.array([1 - config.slow_share, config.slow_share], np.float32)
+        self._learned = False
+        self._numerators = np.zeros((2, 1, 1), np.complex64)
+        self._denominators = np.zeros((2, 1), np.float32)
         window = np.hanning(len(factors) + 2)[1:-1].astype(np.float32)
         self._transform = scipy.fft.rfft(np.diag(window), axis=0)
         self._model = _model_size(size, config.model_area)
@@ -180,15 +145,20 @@ class ScaleFilter(FixedScale):
     def learn(self, view: FrameView, box: BoundingBox) -> None:
         """Average the sample around `box` into the filters."""
         spectrum = self._sample(view, box)
-        self._fast.learn(spectrum)
-        self._slow.learn(spectrum)
+        rates = self._rates if self._learned else np.ones_like(self._rates)
+        numerator = spectrum * self._label
+        denominator = vecdot(spectrum, spectrum).real / spectrum.shape[1]
+        self._numerators = self._numerators + rates[:, None] * (numerator - self._numerators)
+        self._denominators = self._denominators + rates * (denominator - self._denominators)
+        self._learned = True
 
     def estimate(self, view: FrameView, box: BoundingBox) -> float:
         """Return the factor at the maximum of the response."""
         spectrum = self._sample(view, box)
-        fast, slow = self._fast.response(spectrum), self._slow.response(spectrum)
-        response = fast + np.float32(self._config.slow_share) * (slow - fast)
-        return _best_factor(self._config, scipy.fft.irfft(response, len(self._columns)))
+        responses = vecdot(self._numerators, spectrum) / spectrum.shape[1]
+        responses /= self._denominators + np.float32(self._config.regularization)
+        response = scipy.fft.irfft(self._shares @ responses, len(self._columns))
+        return _best_factor(self._config, response)
 
     def _sample(self, view: FrameView, box: BoundingBox) -> np.ndarray:
         """Return the spectrum over scale of the windowed features, shape (n // 2 + 1, d)."""

@@ -98,7 +98,6 @@ class Track:
         check_box(box, (image.shape[1], image.shape[0]))
         self._config = config
         self._box = box
-        self._expected = box.center
         self._frame = 0
         self._frozen = 0
         self._gain = AutomaticGain(config.intensity)
@@ -130,7 +129,6 @@ class Track:
             self._start_over()
         view = FrameView(image, condition.intensity)
         expected = self._pursuit.expected(self._box, view.size)
-        self._expected = expected.center
         sighting = self._look(view, expected)
         if self._frozen or not self._monitor.believable(sighting.evidence):
             sighting = self._search_elsewhere(view, expected, sighting)
@@ -182,7 +180,8 @@ class Track:
         presence = None if self._verification is None else self._verification(
             view, box.moved_to(detection.center))
         likeness = self._detector.likeness(detection) / self._first_likeness
-        jump = math.dist(detection.center, self._expected) / self._box.area**0.5
+        expected = self._pursuit.expected(self._box, view.size)
+        jump = math.dist(detection.center, expected.center) / expected.area**0.5
         return _Sighting(box, detection, Evidence(detection.sharpness, likeness, presence, jump))
 
     def _search_elsewhere(self, view: FrameView, expected: BoundingBox,

@@ -26,7 +26,7 @@ import numpy as np
 from lmsco_ros.core.backend import limit_threads, select_backend
 from lmsco_ros.core.config import TrackerConfig
 from lmsco_ros.core.errors import ImageError, NotInitializedError
-from lmsco_ros.core.intensity import check_image, measured
+from lmsco_ros.core.intensity import check_image
 from lmsco_ros.core.networks import load_networks
 from lmsco_ros.core.track import Track
 from lmsco_ros.core.types import BoundingBox, TrackResult
@@ -53,7 +53,7 @@ class LMSCOTracker:
     Notes
     -----
     Images are (H, W) arrays of uint8, uint16 or float32, or (H, W, 3) of uint8 (BGR). They are
-    not changed.
+    neither copied nor changed.
 
     """
 
@@ -92,8 +92,7 @@ class LMSCOTracker:
 
         """
         check_image(image)
-        self._track = Track(
-            self.config, self._backend, self._networks, measured(image), box)
+        self._track = Track(self.config, self._backend, self._networks, image, box)
         return self._track.result
 
     def update(self, image: np.ndarray) -> TrackResult:
@@ -120,7 +119,7 @@ class LMSCOTracker:
             raise ImageError(
                 f'the frame is {image.shape} {image.dtype}, but the target was initialized in '
                 f'{self._track.image_shape} {self._track.image_type}; initialize again')
-        return self._track.advance(measured(image))
+        return self._track.advance(image)
 
     def reset(self) -> None:
         """Forget the target."""

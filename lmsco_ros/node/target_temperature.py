@@ -21,6 +21,7 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
+from lmsco_ros.core.probe import measured
 from msg_adapters.status import Reading
 
 
@@ -48,7 +49,7 @@ def target_reading(image: npt.NDArray, box: Sequence[float]) -> Reading | None:
     height, width = image.shape
     left, right = _pixels(box[0], box[2], width)
     top, bottom = _pixels(box[1], box[3], height)
-    values = image[top:bottom, left:right]
+    values = measured(image[top:bottom, left:right])
     if values.dtype.kind == 'f':
         values = values[np.isfinite(values)]
     if not values.size:

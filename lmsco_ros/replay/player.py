@@ -21,12 +21,12 @@ from dataclasses import dataclass
 import time
 
 from sensor_msgs.msg import CompressedImage, Image
-from std_msgs.msg import Header
 
 from lmsco_ros.core.types import BoundingBox
 from lmsco_ros.replay.answers import Answer, Answers
 from lmsco_ros.replay.bag_images import serialized_stamp
 from lmsco_ros.replay.errors import NodeError
+from lmsco_ros.replay.headers import header_at
 from lmsco_ros.replay.node_session import Heard, NodeSession
 
 _PATIENCE_SECONDS = 60.0
@@ -82,9 +82,7 @@ class Player:
 
     def start(self, box: BoundingBox, stamp: int) -> None:
         """Ask the node to start on `box` in the frame with `stamp`, which may follow."""
-        header = Header()
-        header.stamp.sec, header.stamp.nanosec = divmod(stamp, 1_000_000_000)
-        self._session.publish_start(box, header)
+        self._session.publish_start(box, header_at(stamp))
 
     def send(self, stamp: int, message: Image | CompressedImage | bytes) -> None:
         """Send the frame with `stamp`."""

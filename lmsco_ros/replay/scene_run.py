@@ -24,9 +24,9 @@ import numpy as np
 import numpy.typing as npt
 from rclpy.serialization import deserialize_message
 from sensor_msgs.msg import Image
-from std_msgs.msg import Header
 
 from lmsco_ros.core.types import BoundingBox, TrackResult, TrackState
+from lmsco_ros.replay.headers import header_at
 from lmsco_ros.replay.node_session import Heard, NodeSession
 from lmsco_ros.replay.player import Exchange, Player
 from lmsco_ros.synthetic import SceneFrame
@@ -94,7 +94,8 @@ def run_scene(frames: Sequence[SceneFrame], parameters: Mapping[str, object],
 
         def send(frame: SceneFrame) -> None:
             stamp = origin + frame.stamp_ns
-            player.send(stamp, message_from_image(frame.image, header=_header(stamp)))
+            player.send(stamp, message_from_image(
+                frame.image, header=header_at(stamp, 'thermal_camera')))
             on_frame()
 
         # The scene stands still until the node has taken up the target.
@@ -113,12 +114,6 @@ def run_scene(frames: Sequence[SceneFrame], parameters: Mapping[str, object],
 class _ConfidenceMap:
     values: npt.NDArray[np.float32]
     region: BoundingBox
-
-
-def _header(stamp: int) -> Header:
-    header = Header(frame_id='thermal_camera')
-    header.stamp.sec, header.stamp.nanosec = divmod(stamp, 1_000_000_000)
-    return header
 
 
 def _read_map(data: bytes) -> _ConfidenceMap:

@@ -60,9 +60,9 @@ def test_folder_without_an_evaluation_is_named(tmp_path):
 
 def test_table_takes_its_place_in_a_page():
     page = 'before\n<!-- cases -->\nold\n<!-- /cases -->\nafter\n'
-    once = insert(page, 'cases', '| new |\n')
+    once = insert(page, 'cases', '| new |')
     assert once == 'before\n<!-- cases -->\n| new |\n<!-- /cases -->\nafter\n'
-    assert insert(once, 'cases', '| new |\n') == once
+    assert insert(once, 'cases', '| new |') == once
     with pytest.raises(ValueError, match='<!-- other -->'):
         insert(page, 'other', '')
 

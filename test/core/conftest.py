@@ -19,11 +19,13 @@ The references work with functions on a grid and explicit sums of exponentials; 
 code with the half spectra of the tracker.
 """
 
+from functools import partial
 from types import SimpleNamespace
 
 import array_api_compat.numpy as numpy_namespace
 import numpy as np
 import pytest
+import scipy.linalg
 from scipy.special import erf
 
 from lmsco_ros.core import BoundingBox
@@ -181,45 +183,50 @@ def dense_problem(blocks, weights, gamma, margin_weight):
         `unpack`: half spectra to coordinates and back.
 
     """
-    size = blocks[0][0].size
+    grams = [gram for space, samples in blocks
+             for gram in [window_gram(space, gamma)] * samples.shape[3]]
+    scores = np.concatenate([
+        score_matrices(space, samples[..., channel])
+        for space, samples in blocks for channel in range(samples.shape[3])], axis=2)
+    return SimpleNamespace(
+        scores=scores, penalty=scipy.linalg.block_diag(*grams), weights=np.asarray(weights),
+        pack=partial(pack, blocks), unpack=partial(unpack, blocks), margin_weight=margin_weight)
+
+
+def window_gram(space, gamma):
+    """Return G^T G in the coordinates of a band."""
     fine = gamma.shape[0]
-    parts, grams = [], []
+    wide = Band(space.order, fine).basis()
+    product = wide.T @ (gamma.reshape(-1, 1) * wide) / fine**2
+    return product.T @ product
+
+
+def score_matrices(space, samples):
+    """Return, for each sample (N, N, n) of a channel, coordinates to scores (n, N^2, d)."""
+    basis = space.basis()
+    return np.stack([convolution_matrix(samples[:, :, j]) @ basis
+                     for j in range(samples.shape[2])])
+
+
+def pack(blocks, filters):
+    """Return the coordinates of half spectra."""
+    return np.concatenate([
+        space.basis().T @ space.values(block)[:, :, c].reshape(-1) / space.size**2
+        for (space, _), block in zip(blocks, filters, strict=True)
+        for c in range(block.shape[2])])
+
+
+def unpack(blocks, coordinates):
+    """Return the half spectra at coordinates."""
+    filters, first = [], 0
     for space, samples in blocks:
-        basis = space.basis()
-        wide = Band(space.order, fine).basis()
-        product = wide.T @ (gamma.reshape(-1, 1) * wide) / fine**2
-        for channel in range(samples.shape[3]):
-            parts.append(np.stack([
-                convolution_matrix(samples[:, :, j, channel]) @ basis
-                for j in range(samples.shape[2])]))
-            grams.append(product.T @ product)
-    scores = np.concatenate(parts, axis=2)
-    penalty = np.zeros((scores.shape[2],) * 2)
-    start = 0
-    for gram in grams:
-        penalty[start:start + len(gram), start:start + len(gram)] = gram
-        start += len(gram)
-
-    def pack(filters):
-        return np.concatenate([
-            space.basis().T @ space.values(block)[:, :, c].reshape(-1) / size**2
-            for (space, _), block in zip(blocks, filters, strict=True)
-            for c in range(block.shape[2])])
-
-    def unpack(coordinates):
-        filters, first = [], 0
-        for space, samples in blocks:
-            channels = []
-            for _ in range(samples.shape[3]):
-                basis = space.basis()
-                part = coordinates[first:first + basis.shape[1]]
-                channels.append(space.series((basis @ part).reshape(size, size)))
-                first += basis.shape[1]
-            filters.append(np.stack(channels, axis=-1))
-        return filters
-
-    return SimpleNamespace(scores=scores, penalty=penalty, pack=pack, unpack=unpack,
-                           weights=np.asarray(weights), margin_weight=margin_weight)
+        basis, channels = space.basis(), []
+        for _ in range(samples.shape[3]):
+            part = coordinates[first:first + basis.shape[1]]
+            channels.append(space.series((basis @ part).reshape(space.size, space.size)))
+            first += basis.shape[1]
+        filters.append(np.stack(channels, axis=-1))
+    return filters
 
 
 def convolution_matrix(values):

@@ -20,8 +20,7 @@ import pytest
 
 from lmsco_ros.core.config import IntensityConfig
 from lmsco_ros.core.errors import ImageError
-from lmsco_ros.core.intensity import (
-    AutomaticGain, check_image, IntensityRange, measured, to_gray)
+from lmsco_ros.core.intensity import AutomaticGain, check_image, IntensityRange, to_gray
 
 CONFIG = IntensityConfig(low_percentile=2, high_percentile=97, smoothing=0.25, jump=0.2)
 
@@ -114,17 +113,6 @@ def test_pixels_without_a_value_do_not_count():
     image[:, :30], image[:, 30] = np.nan, np.inf
     observed = AutomaticGain(CONFIG).observe(image)
     assert as_tuple(observed) == pytest.approx(tuple(np.percentile(image[:, 31:], (2, 97))))
-
-
-def test_measured_frame_stays_and_others_are_copied():
-    image = scene()
-    assert measured(image) is image
-    image[3, 5], image[4, 6] = 1.01e12, -np.inf
-    clean = measured(image)
-    assert np.isnan(clean[[3, 4], [5, 6]]).all() and np.isfinite(clean).sum() == image.size - 2
-    assert image[3, 5] == np.float32(1.01e12) and clean.dtype == np.float32
-    counts = np.full((20, 20), 65535, np.uint16)
-    assert measured(counts) is counts
 
 
 @pytest.mark.filterwarnings('error')

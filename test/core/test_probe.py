@@ -23,7 +23,7 @@ from lmsco_ros.core.config import IntensityConfig
 from lmsco_ros.core.errors import ImageError
 from lmsco_ros.core.intensity import AutomaticGain, IntensityRange
 from lmsco_ros.core.probe import (
-    credible_values, is_frozen, percentiles, SceneChange, SceneMonitor, take_probe,
+    credible_values, is_frozen, measured, percentiles, SceneChange, SceneMonitor, take_probe,
     without_dead_pixels)
 
 SHAPE = (120, 160)
@@ -239,3 +239,14 @@ def test_nothing_but_noise_is_still_a_range(rng):
     noise = rng.integers(0, 65536, SHAPE).astype(np.uint16)
     observed = AutomaticGain(IntensityConfig()).observe(noise)
     assert observed.low < 3000 and observed.high > 62000
+
+
+def test_measured_pixels_stay_and_others_are_copied():
+    image = scene().astype(np.float32)
+    assert measured(image) is image
+    image[3, 5], image[4, 6] = 1.01e12, -np.inf
+    clean = measured(image)
+    assert np.isnan(clean[[3, 4], [5, 6]]).all() and np.isfinite(clean).sum() == image.size - 2
+    assert image[3, 5] == np.float32(1.01e12) and clean.dtype == np.float32
+    counts = np.full((20, 20), 65535, np.uint16)
+    assert measured(counts) is counts

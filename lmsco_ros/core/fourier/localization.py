@@ -23,7 +23,7 @@ import math
 import numpy as np
 
 from lmsco_ros.core.backend import Array, to_numpy
-from lmsco_ros.core.fourier.series import bandwidth, grid_size, synthesize
+from lmsco_ros.core.fourier.series import bandwidth, grid_size, half_weights, synthesize
 
 __all__ = ['Peak', 'centered_map', 'locate', 'refine']
 
@@ -107,8 +107,7 @@ def refine(series: np.ndarray, start: tuple[float, float],
 
     """
     order = bandwidth(series)
-    weighted = series.astype(np.complex128)
-    weighted[:, 1:] *= 2
+    weighted = series.astype(np.complex128) * half_weights(series)
     position, derivatives = start, _derivatives(weighted, start)
     first = derivatives[0, 0]
     for _ in range(steps):

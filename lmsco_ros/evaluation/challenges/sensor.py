@@ -27,7 +27,7 @@ from lmsco_ros.evaluation.challenges.changed_frames import (
 from lmsco_ros.evaluation.challenges.intensities import Span, stored
 from lmsco_ros.evaluation.datasets import TrackingSequence
 
-_SHUTTER_EVERY, _SHUTTER_FRAMES = 60, 12
+SHUTTER_EVERY, SHUTTER_FRAMES = 60, 12
 _GAIN_EVERY = 20
 _DEAD_SHARE, _DEAD_LINES = 0.003, 2
 _TELEMETRY_ROWS = 4
@@ -44,8 +44,8 @@ def shutter(sequence: TrackingSequence) -> TrackingSequence:
     the picture shown.
     """
     frames = np.arange(len(sequence))
-    since = frames % _SHUTTER_EVERY
-    closed = (frames >= _SHUTTER_EVERY) & (since < _SHUTTER_FRAMES)
+    since = frames % SHUTTER_EVERY
+    closed = (frames >= SHUTTER_EVERY) & (since < SHUTTER_FRAMES)
     order = np.where(closed, frames - since, frames)
     attributes = {name: flags[order] for name, flags in sequence.attributes.items()}
     return replace(sequence, ground_truth=sequence.ground_truth[order], attributes=attributes,

@@ -1,0 +1,164 @@
+# Copyright 2026 lmsco_ros contributors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Size of the target, and whether it is there."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from lmsco_ros.core.errors import ConfigError
+from lmsco_ros.core.validation import check_choice, check_range
+
+__all__ = ['ConfidenceConfig', 'ScaleConfig', 'VerificationConfig']
+
+_LARGEST_SCALE = 4.0
+
+
+@dataclass(frozen=True)
+class ScaleConfig:
+    """
+    How the size of the target is followed.
+
+    Attributes
+    ----------
+    estimator : {'filter', 'search', 'none'}
+        One-dimensional scale filter (DSST), search over scaled patches (the paper), or a
+        constant size.
+    step : float
+        Ratio of two neighboring scales.
+    exponent_min, exponent_max : int
+        Range of the exponents of `step`.
+    learning_rate : float
+        Of the scale filter, which learns in the frames in which the filter is trained.
+    slow_rate, slow_share : float
+        Learning rate of the scale filter that holds on to the first frames, and its share in
+        the response.
+    model_area : float
+        Area of a scale sample in pixels.
+    padding : float
+        Side of a scale sample over that of the target.
+    regularization : float
+        Ridge term of the scale filter.
+    label_sigma : float
+        Standard deviation of its label, in scales.
+
+    """
+
+    estimator: str = 'filter'
+    step: float = 1.02
+    exponent_min: int = -8
+    exponent_max: int = 8
+    learning_rate: float = 0.12
+    slow_rate: float = 0.01
+    slow_share: float = 0.0
+    model_area: float = 512.0
+    padding: float = 1.0
+    regularization: float = 0.01
+    label_sigma: float = 1.0
+
+    def __post_init__(self) -> None:
+        """Check the ranges."""
+        check_choice(self, 'estimator', ('filter', 'search', 'none'))
+        check_range(self, 'step', 1, 2, open_low=True)
+        check_range(self, 'exponent_min', -50, 0)
+        check_range(self, 'exponent_max', 0, 50)
+        check_range(self, 'learning_rate', 0, 1)
+        check_range(self, 'slow_rate', 0, 1)
+        check_range(self, 'slow_share', 0, 1)
+        check_range(self, 'model_area', 64, 65536)
+        check_range(self, 'padding', 1, 4)
+        check_range(self, 'regularization', 0, 100, open_low=True)
+        check_range(self, 'label_sigma', 0, 50, open_low=True)
+        reach = self.step**max(self.exponent_max, -self.exponent_min)
+        if reach > _LARGEST_SCALE:
+            raise ConfigError(f'ScaleConfig.step and its exponents reach a factor of {reach:g} '
+                              f'from one frame to the next; expected at most {_LARGEST_SCALE:g}')
+
+
+@dataclass(frozen=True)
+class VerificationConfig:
+    """
+    Comparison of what is found with the first frame.
+
+    Attributes
+    ----------
+    backbone : str
+        Name of the weights of the network that compares; empty for no comparison.
+
+    """
+
+    backbone: str = ''
+
+
+@dataclass(frozen=True)
+class ConfidenceConfig:
+    """
+    When the target counts as lost and as found again.
+
+    Attributes
+    ----------
+    learn : {'tracking', 'always'}
+        Whether the box follows and the filter learns only what is believed, or every frame, as
+        in the paper, whatever the state says.
+    reference_frames : int
+        Frames after the start whose median sharpness is the measure of all later ones.
+    uncertain, certain : float
+        Score below which TRACKING becomes UNCERTAIN, and from which UNCERTAIN becomes TRACKING
+        again.
+    lost : float
+        Score below which a frame is not believed; after a jump by more than the target's side,
+        `uncertain` is.
+    lost_frames : int
+        Frames in a row that are not believed until the state is LOST.
+    found : float
+        Score from which a target is found again, or found where it was not expected.
+    sharp, alike : float
+        Sharpness, as a part of the reference, and score of the first frame's filter, as a part
+        of that in the first frame, that a target has to reach for this.
+    candidates, tiles : int
+        Salient places, and other regions of the image, that are searched per frame while the
+        target is missing.
+    distractors : bool
+        Whether other peaks of the score are remembered, so that they do not take the place of
+        a target that vanishes.
+
+    """
+
+    learn: str = 'tracking'
+    reference_frames: int = 10
+    uncertain: float = 0.7
+    certain: float = 0.75
+    lost: float = 0.3
+    lost_frames: int = 5
+    found: float = 0.9
+    sharp: float = 0.4
+    alike: float = 0.3
+    candidates: int = 4
+    tiles: int = 2
+    distractors: bool = True
+
+    def __post_init__(self) -> None:
+        """Check the ranges."""
+        check_choice(self, 'learn', ('tracking', 'always'))
+        check_range(self, 'reference_frames', 1, 1000)
+        check_range(self, 'lost', 0, 1)
+        check_range(self, 'uncertain', self.lost, 1)
+        check_range(self, 'certain', self.uncertain, 1)
+        check_range(self, 'found', self.lost, 1)
+        check_range(self, 'sharp', 0, 2)
+        check_range(self, 'alike', -1, 2)
+        check_range(self, 'lost_frames', 1, 1000)
+        check_range(self, 'candidates', 0, 64)
+        check_range(self, 'tiles', 0, 64)
