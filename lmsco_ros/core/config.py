@@ -174,7 +174,7 @@ def _presets() -> Mapping[str, TrackerConfig]:
                 *HANDCRAFTED[0].channels), projection=32),),
             sampling=SamplingConfig(patch_size_min=100, patch_size_max=100),
             learning=LearningConfig(iterations=1, gradient_steps=1, update_interval=2),
-            scale=ScaleConfig(exponent_min=-5, exponent_max=5, learning_rate=0.3,
+            scale=ScaleConfig(step=1.03, exponent_min=-5, exponent_max=5, learning_rate=0.3,
                               slow_share=0.3, model_area=1024.0, label_sigma=1.5),
             verification=VerificationConfig('verification')),
         'paper': paper,
