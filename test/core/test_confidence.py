@@ -136,6 +136,18 @@ def test_lost_target_is_found_when_all_three_agree(monitor, lack):
     assert monitor.judge(CLEAR) is TrackState.TRACKING
 
 
+def test_after_a_cut_the_target_has_to_convince_but_with_less(monitor):
+    weak = Evidence(3.5, 1.0, -0.5)
+    assert monitor.believable(weak) and not monitor.convincing(weak)
+    monitor.cut()
+    # Half of what convinces otherwise does now; what was enough to go on does not.
+    assert monitor.convincing(weak) and monitor.after_cut
+    doubtful = at_score(monitor, 0.55)
+    assert not monitor.believable(doubtful)
+    assert monitor.judge(weak) is not TrackState.LOST
+    assert not monitor.after_cut and monitor.believable(doubtful)
+
+
 def test_without_a_network_the_filters_have_to_agree(monitor):
     for _ in range(3):
         monitor.judge(GONE)

@@ -107,6 +107,15 @@ def test_flat_frames_and_other_scenes_switch_nothing():
     assert tracker.observe((14600 - scene(5)).astype(np.float32), 7000, 7600).switched
 
 
+def test_range_of_another_view_is_adopted_at_once():
+    gain = AutomaticGain(IntensityConfig(smoothing=0.01, jump=1.0))
+    before = gain.examine(scene(0).astype(np.float32))
+    after = gain.examine(scene(3, low=7100.0).astype(np.float32))
+    alone = AutomaticGain(IntensityConfig()).observe(scene(3, low=7100.0).astype(np.float32))
+    assert (before.cut, after.cut) == (False, True)
+    assert after.intensity == alone
+
+
 def test_cut_to_another_scene_is_seen_once():
     tracker = SceneMonitor()
     images = [scene(seed).astype(np.float32) for seed in (0, 0, 3, 3, 3)]

@@ -107,6 +107,13 @@ def test_distractor_is_forgotten_after_two_seconds(distractors, scenery):
     assert distractors.places == [] and not distractors.explain(TWIN, BOX, scenery.resembles)
 
 
+def test_another_view_has_no_distractors_yet(distractors, scenery):
+    assert distractors.explain(TWIN, BOX, scenery.resembles)
+    distractors.forget()
+    assert distractors.places == []
+    assert not distractors.explain(TWIN, BOX, scenery.resembles)
+
+
 def test_kept_frame_is_a_copy(scenery):
     view, distractors = scenery.view(BOX.center, TWIN), Distractors()
     distractors.certain(view, BOX)
@@ -138,6 +145,25 @@ def test_missed_target_goes_on_and_comes_to_rest():
     assert ways[0] == pytest.approx(3, rel=0.01)
     assert np.all(np.diff(ways) >= 0) and np.diff(ways)[-1] < 1e-3
     assert ways[-1] == pytest.approx(3 / 0.3, rel=0.01)
+
+
+def test_after_a_cut_the_target_does_not_go_on_and_the_search_starts_over():
+    pursuit = Pursuit(4)
+    box = walk(pursuit, (3, -1), 20)
+    first = pursuit.slice(SIZE, 80, box.center)
+    pursuit.missed()
+    pursuit.cut()
+    assert pursuit.expected(box, SIZE) == box
+    assert pursuit.slice(SIZE, 80, box.center) == first
+
+
+def test_misses_are_counted_from_the_last_sight():
+    pursuit = Pursuit(4)
+    counts = []
+    for seen in (True, False, False, True, False):
+        pursuit.seen(BOX.center) if seen else pursuit.missed()
+        counts.append(pursuit.misses)
+    assert counts == [0, 1, 2, 0, 1]
 
 
 def test_expected_center_stays_in_the_image():

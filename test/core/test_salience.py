@@ -40,7 +40,7 @@ def box_at(x, y, side):
     return BoundingBox.from_center((x, y), (side, side))
 
 
-@given(x=st.integers(20, 180), y=st.integers(20, 90), contrast=st.floats(0.1, 0.5),
+@given(x=st.integers(20, 180), y=st.integers(20, 80), contrast=st.floats(0.1, 0.5),
        warm=st.booleans())
 @settings(max_examples=20)
 def test_target_on_even_ground_comes_first_wherever_it_is(x, y, contrast, warm):
@@ -78,6 +78,19 @@ def test_no_more_candidates_than_asked_for(count):
     spots = [(30 * n, 40, 12, 0.1 * n) for n in range(1, 6)]
     found = salience.candidates(view_of(*spots, noise=0.01), box_at(50, 50, 12), count)
     assert len(found) == count
+
+
+def test_large_image_is_reduced_before_it_is_searched(monkeypatch):
+    sizes = []
+    patch = FrameView.patch
+    monkeypatch.setattr(FrameView, 'patch', lambda view, region, size: sizes.append(size) or patch(
+        view, region, size))
+    image = np.full((1080, 1920), 0.4, np.float32)
+    image[500:512, 900:912] = 0.8
+    view = FrameView(image, IntensityRange(0.0, 1.0))
+    found = Salience(view, box_at(906, 506, 12)).candidates(view, box_at(906, 506, 12), 1)
+    assert np.prod(sizes[-1]) <= 101_000
+    assert found[0].center == pytest.approx((906, 506), abs=5)
 
 
 def test_large_target_is_found_in_a_reduced_picture():

@@ -14,6 +14,8 @@
 
 """Scale estimators on targets whose size is known."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -100,6 +102,21 @@ def test_filter_follows_a_steady_change(view, box_at, rate):
         errors.append(abs(box.width / (size[0] * rate**n) - 1))
     assert np.mean(errors) < 0.01
     assert box.height / box.width == pytest.approx(18 / 24)
+
+
+def test_slow_filter_holds_on_to_the_size_that_the_fast_one_forgets(view, box_at):
+    size = (24.0, 18.0)
+    estimates = []
+    for share in (0.0, 0.5, 1.0):
+        config = replace(CONFIG, learning_rate=1.0, slow_rate=0.01, slow_share=share)
+        estimator = ScaleFilter(config, size)
+        estimator.learn(view(size), box_at(CENTER, size))
+        # A box that is too large by a tenth is learned once.
+        estimator.learn(view(size), box_at(CENTER, scaled(size, 1.1)))
+        estimates.append(estimator.estimate(view(size), box_at(CENTER, scaled(size, 1.1))))
+    assert estimates[0] == pytest.approx(1, abs=0.005)
+    assert estimates[2] == pytest.approx(1 / 1.1, abs=0.03)
+    assert estimates[2] <= estimates[1] <= estimates[0]
 
 
 def test_filter_does_not_drift_on_a_static_target(view, box_at, rng):

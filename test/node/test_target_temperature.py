@@ -57,6 +57,12 @@ def test_color_and_nothing_finite_have_no_reading():
     assert target_reading(np.full((9, 9), np.nan, np.float32), (0, 0, 5, 5)) is None
 
 
+def test_numbers_that_no_camera_measures_do_not_count():
+    image = np.full((9, 9), 300.0, np.float32)
+    image[2, 2] = np.finfo(np.float32).max
+    assert target_reading(image, (0, 0, 9, 9)) == Reading(300.0, 300.0, 300.0)
+
+
 def test_centikelvin_and_unknown_scale():
     assert celsius(Reading(27315, 30000, 31015), 0.01, -273.15) == pytest.approx(
         (0.0, 26.85, 37.0))
