@@ -48,12 +48,10 @@ class Hinge:
         return self.rows.T @ target + self.core.T @ np.ones(5) - self.matrix @ w
 
     def train(self, outer, steps, restart):
-        solver = ConjugateGradient(lambda a, b: float(a @ b))
+        solvers = [ConjugateGradient(lambda a, b: float(a @ b)) for _ in range(outer)]
         iterates = (self.zero,)
         values = []
-        for _ in range(outer):
-            if restart:
-                solver.restart()
+        for solver in solvers if restart else outer * solvers[:1]:
             iterates = solver.solve(iterates, self.residual(iterates[0]), steps, self.operator,
                                     lambda r: r)
             values.append(self.objective(iterates[0]))

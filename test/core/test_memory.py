@@ -82,7 +82,7 @@ def test_memory_of_one_holds_the_newest(backend, rng):
 
 def test_bandwidth_is_the_largest(backend):
     memory = SampleMemory(2, 0.1, SHAPES, backend)
-    assert memory.order == 4 and memory.grid == 9 and len(memory) == 0
+    assert memory.order == 4 and len(memory) == 0
 
 
 def test_scores_are_convolutions_in_space(backend, band, rng):

@@ -48,10 +48,6 @@ class ConjugateGradient:
         self._residual: Array | None = None
         self._energy = 0.0
 
-    def restart(self) -> None:
-        """Forget the direction."""
-        self._direction = None
-
     def solve(self, iterates: Images, residual: Array, steps: int,
               operator: Callable[[Array], tuple[Array, Images]],
               precondition: Callable[[Array], Array]) -> Images:

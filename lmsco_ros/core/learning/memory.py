@@ -21,7 +21,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from lmsco_ros.core.backend import Array, array_namespace, Backend
-from lmsco_ros.core.fourier.series import bandwidth, crop, embed, grid_size
+from lmsco_ros.core.fourier.series import bandwidth, crop, embed
 
 __all__ = ['PriorWeights', 'SampleMemory', 'score']
 
@@ -138,11 +138,6 @@ class SampleMemory:
     def order(self) -> int:
         """Bandwidth of the scores."""
         return max(bandwidth(block) for block in self._storage)
-
-    @property
-    def grid(self) -> int:
-        """Points per axis that carry the scores exactly."""
-        return grid_size(self.order)
 
     @property
     def weights(self) -> Array:
