@@ -64,8 +64,10 @@ _USUAL_PRESENCE = 4.0
 _USUAL_RATE = 0.03
 
 # After a cut the target is likely to be somewhere in the picture, and looks different: score and
-# part of the other thresholds that it has to reach, and its least log-odds of presence.
+# part of the other thresholds that it has to reach, and its least log-odds of presence. By then,
+# in frames, it would have been found.
 _AFTER_CUT = (0.8, 0.5, -2.0)
+_CUT_FRAMES = 100
 
 
 @dataclass(frozen=True)
@@ -112,7 +114,7 @@ class ConfidenceMonitor:
     _reference: float | None = None
     _state: TrackState = TrackState.TRACKING
     _misses: int = 0
-    _cut: bool = False
+    _cut: int = 0
 
     @property
     def state(self) -> TrackState:
@@ -121,8 +123,8 @@ class ConfidenceMonitor:
 
     @property
     def after_cut(self) -> bool:
-        """Whether the target has not been seen since the view changed."""
-        return self._cut
+        """Whether the view has changed a while ago and the target has not been seen since."""
+        return self._cut > 0
 
     @property
     def learns(self) -> bool:
@@ -158,7 +160,7 @@ class ConfidenceMonitor:
         Filter, first filter and comparison must agree, each of them; less so after a cut.
         """
         presence = self.presence(evidence)
-        found, part, present = _AFTER_CUT if self._cut else (1.0, 1.0, 0.0)
+        found, part, present = _AFTER_CUT if self.after_cut else (1.0, 1.0, 0.0)
         return (self.score(evidence) >= min(self.config.found, found)
                 and self.quality(evidence.sharpness) >= part * self.config.sharp
                 and evidence.likeness >= part * self.config.alike
@@ -166,7 +168,7 @@ class ConfidenceMonitor:
 
     def cut(self) -> None:
         """Take note that the view has changed: the target has to be found again."""
-        self._cut = True
+        self._cut = _CUT_FRAMES
 
     def believable(self, evidence: Evidence) -> bool:
         """Return whether a frame shows the target."""
@@ -184,8 +186,8 @@ class ConfidenceMonitor:
         score = self.score(evidence)
         missed = self._misses_target(evidence)
         self._misses = self._misses + 1 if missed else 0
+        self._cut = max(0, self._cut - 1) if missed else 0
         if not missed:
-            self._cut = False
             self._state = (TrackState.TRACKING if score >= self._certain()
                            else TrackState.UNCERTAIN)
             self._set_reference(evidence)
@@ -196,7 +198,7 @@ class ConfidenceMonitor:
 
     def _misses_target(self, evidence: Evidence) -> bool:
         """Return whether a frame does not show the target, as far as one can tell."""
-        if self._cut or self._state is TrackState.LOST:
+        if self.after_cut or self._state is TrackState.LOST:
             return not self.convincing(evidence)
         jumped = evidence.jump > _JUMP
         return self.score(evidence) < (self.config.uncertain if jumped else self.config.lost)

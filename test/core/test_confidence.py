@@ -148,6 +148,18 @@ def test_after_a_cut_the_target_has_to_convince_but_with_less(monitor):
     assert not monitor.after_cut and monitor.believable(doubtful)
 
 
+def test_what_a_cut_excuses_is_forgotten_in_time(monitor):
+    weak = Evidence(3.5, 1.0, -0.5)
+    monitor.cut()
+    for _ in range(99):
+        monitor.judge(GONE)
+    assert monitor.after_cut and monitor.convincing(weak)
+    assert monitor.judge(GONE) is TrackState.LOST
+    assert not monitor.after_cut and not monitor.convincing(weak)
+    # Who convinces as at any other time is found.
+    assert monitor.judge(CLEAR) is not TrackState.LOST
+
+
 def test_without_a_network_the_filters_have_to_agree(monitor):
     for _ in range(3):
         monitor.judge(GONE)
