@@ -29,7 +29,7 @@ from lmsco_ros.core.sampling import FrameView
 from lmsco_ros.core.types import BoundingBox
 
 __all__ = ['FixedScale', 'ScaleEstimator', 'ScaleFilter', 'ScaleSearch', 'make_scale_estimator',
-           'scale_factors']
+           'scale_factors', 'steady']
 
 _CELL = 4
 
@@ -181,6 +181,30 @@ class ScaleFilter(FixedScale):
             box.center, (self._largest * box.width, self._largest * box.height))
         rows = self._rows @ view.patch(region, self._pixels)
         return rows.reshape(len(self._columns), self._model[1], -1) @ self._columns
+
+
+def steady(box: BoundingBox, first: tuple[float, float], tolerance: float) -> BoundingBox:
+    """
+    Return a box without the change of size that is less than what can be measured.
+
+    The size of a target is known to a part of a pixel at best, which is much of a small one:
+    what is measured is the most probable size under Gaussian noise, and a Laplace prior around
+    the size in the first frame, at a soft threshold.
+
+    Parameters
+    ----------
+    box : BoundingBox
+        Target in the size that was measured.
+    first : tuple of float
+        Size of the target (width, height) in the first frame.
+    tolerance : float
+        Threshold in pixels, of the side of a square of the first size.
+
+    """
+    change = 0.5 * math.log(box.area / (first[0] * first[1]))
+    threshold = tolerance / math.sqrt(first[0] * first[1])
+    beyond = max(0.0, abs(change) - threshold)
+    return box.scaled(math.exp(math.copysign(beyond, change) - change))
 
 
 def _model_size(size: tuple[float, float], area: float) -> tuple[int, int]:

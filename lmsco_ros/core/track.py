@@ -32,7 +32,7 @@ from lmsco_ros.core.networks import Networks
 from lmsco_ros.core.pursuit import Pursuit
 from lmsco_ros.core.salience import Salience
 from lmsco_ros.core.sampling import check_box, clamp_box, FrameView, visible_part
-from lmsco_ros.core.scale import make_scale_estimator
+from lmsco_ros.core.scale import make_scale_estimator, steady
 from lmsco_ros.core.types import BoundingBox, TrackResult, TrackState
 from lmsco_ros.core.verification import Verification
 
@@ -97,7 +97,7 @@ class Track:
         self.image_shape, self.image_type = image.shape, image.dtype
         check_box(box, (image.shape[1], image.shape[0]))
         self._config = config
-        self._box = box
+        self._box, self._first_size = box, box.size
         self._frame = 0
         self._frozen = 0
         self._gain = AutomaticGain(config.intensity)
@@ -149,7 +149,8 @@ class Track:
     def _describe(self, detection: Detection, score: float, state: TrackState) -> TrackResult:
         """Return what there is to say; the target in the first frame scores 1 in the map."""
         confidence_map = centered_map(detection.peak.grid / self._first_peak)
-        shown = visible_part(self._box, (self.image_shape[1], self.image_shape[0]))
+        box = steady(self._box, self._first_size, self._config.scale.tolerance)
+        shown = visible_part(box, (self.image_shape[1], self.image_shape[0]))
         return TrackResult(shown, score, state, confidence_map, detection.region)
 
     def _start_over(self) -> None:

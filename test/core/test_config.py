@@ -214,6 +214,7 @@ BOUNDS = [
     (ScaleConfig, 'exponent_max', -1, 51), (ScaleConfig, 'learning_rate', -0.1, 1.1),
     (ScaleConfig, 'model_area', 63, 65537), (ScaleConfig, 'padding', 0.9, 4.1),
     (ScaleConfig, 'regularization', 0, 101), (ScaleConfig, 'label_sigma', 0, 51),
+    (ScaleConfig, 'tolerance', -1, 11),
     (MotionConfig, 'least_motion', -0.1, 101),
     (ConfidenceConfig, 'found', 0.05, 1.1), (ConfidenceConfig, 'certain', 0.4, 1.1),
     (ConfidenceConfig, 'sharp', -0.1, 2.1), (ConfidenceConfig, 'alike', -1.1, 2.1),

@@ -15,7 +15,9 @@
 """Scale estimators on targets whose size is known."""
 
 from dataclasses import replace
+import math
 
+from hypothesis import given, strategies as st
 import numpy as np
 import pytest
 
@@ -23,7 +25,8 @@ from lmsco_ros.core.config import IntensityConfig, ScaleConfig
 from lmsco_ros.core.intensity import AutomaticGain
 from lmsco_ros.core.sampling import FrameView
 from lmsco_ros.core.scale import (
-    FixedScale, make_scale_estimator, scale_factors, ScaleFilter, ScaleSearch)
+    FixedScale, make_scale_estimator, scale_factors, ScaleFilter, ScaleSearch, steady)
+from lmsco_ros.core.types import BoundingBox
 
 CONFIG = ScaleConfig(estimator='filter', step=1.03, exponent_min=-8, exponent_max=8,
                      learning_rate=0.1, model_area=512, padding=1.0, regularization=0.01,
@@ -196,3 +199,30 @@ def test_fixed_scale_stays(view, box_at):
 
 def test_filter_searches_at_one_scale():
     assert tuple(ScaleFilter(CONFIG, (24.0, 18.0)).search_factors) == (1.0,)
+
+
+SIDES = st.floats(4, 400)
+
+
+@given(width=SIDES, height=SIDES, factor=st.floats(0.2, 5), tolerance=st.floats(0, 2))
+def test_size_is_given_with_the_tolerance_less_of_change(width, height, factor, tolerance):
+    size = (width, height)
+    box = BoundingBox.from_center(CENTER, scaled(size, factor))
+    given_box = steady(box, size, tolerance)
+    assert given_box.center == pytest.approx(CENTER)
+    assert given_box.width / given_box.height == pytest.approx(width / height)
+    # Brute force: the nearest size to the first one within the tolerance of what was measured.
+    side = math.sqrt(width * height)
+    changes = np.linspace(-2, 2, 40001)
+    within = changes[np.abs(changes - math.log(factor)) <= tolerance / side + 1e-9]
+    expected = math.exp(within[np.abs(within).argmin()]) if len(within) else factor
+    assert math.sqrt(given_box.area) / side == pytest.approx(expected, rel=2e-4)
+
+
+def test_same_size_stays_and_noise_of_a_small_target_is_not_a_change():
+    first = BoundingBox.from_center(CENTER, (12.0, 12.0))
+    assert steady(first, first.size, 0.5).size == pytest.approx((12, 12))
+    assert steady(first.scaled(1.03), first.size, 0.5).size == pytest.approx((12, 12))
+    assert steady(first.scaled(2.0), first.size, 0.5).width == pytest.approx(23, abs=0.1)
+    large = BoundingBox.from_center(CENTER, (120.0, 120.0))
+    assert steady(large.scaled(1.03), large.size, 0.5).width == pytest.approx(123.1, abs=0.05)
