@@ -176,6 +176,11 @@ class ConfidenceMonitor:
             return True
         return not self._misses_target(evidence)
 
+    def beyond_doubt(self, evidence: Evidence) -> bool:
+        """Return whether the target was just seen, and a frame shows it where it is expected."""
+        return (self._state is TrackState.TRACKING and not self.after_cut
+                and evidence.jump <= _JUMP and self.score(evidence) >= self.config.uncertain)
+
     def similar(self, evidence: Evidence) -> bool:
         """Return whether something looks like the target; the target itself may stand beside."""
         return (trust(1.0, evidence.likeness, self.presence(evidence)) >= self.config.uncertain

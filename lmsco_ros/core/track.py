@@ -95,7 +95,7 @@ class Track:
     def __init__(self, config: TrackerConfig, backend: Backend, networks: Networks,
                  image: np.ndarray, box: BoundingBox) -> None:
         self.image_shape, self.image_type = image.shape, image.dtype
-        check_box(box, (image.shape[1], image.shape[0]))
+        check_box(box, self._image_size)
         self._config = config
         self._box, self._first_size = box, box.size
         self._frame = 0
@@ -108,6 +108,7 @@ class Track:
         self._pursuit = Pursuit(config.confidence.tiles)
         self._scale = make_scale_estimator(config.scale, box.size)
         self._scale.learn(view, box)
+        self._presence: float | None = None
         self._verification = None if networks.verification is None else Verification(
             networks.verification, view, box)
         self._salience = Salience(view, box)
@@ -135,6 +136,7 @@ class Track:
         self._frozen = 0
         believed = self._monitor.believable(sighting.evidence)
         state = self._monitor.judge(sighting.evidence)
+        self._presence = sighting.evidence.presence
         if believed:
             self._follow(view, self._resized(view, sighting))
         else:
@@ -146,11 +148,26 @@ class Track:
             sighting.detection, self._monitor.score(sighting.evidence), state)
         return self.result
 
+    @property
+    def _image_size(self) -> tuple[int, int]:
+        """Width and height of the images."""
+        return self.image_shape[1], self.image_shape[0]
+
+    @property
+    def _trains(self) -> bool:
+        """Whether the filter is trained in this frame."""
+        return self._frame % self._config.learning.update_interval == 0
+
+    @property
+    def _spared(self) -> bool:
+        """Whether this frame, which trains, leaves what can wait to the next one."""
+        return self._trains and self._config.learning.update_interval > 1
+
     def _describe(self, detection: Detection, score: float, state: TrackState) -> TrackResult:
         """Return what there is to say; the target in the first frame scores 1 in the map."""
         confidence_map = centered_map(detection.peak.grid / self._first_peak)
         box = steady(self._box, self._first_size, self._config.scale.tolerance)
-        shown = visible_part(box, (self.image_shape[1], self.image_shape[0]))
+        shown = visible_part(box, self._image_size)
         return TrackResult(shown, score, state, confidence_map, detection.region)
 
     def _start_over(self) -> None:
@@ -165,6 +182,10 @@ class Track:
         detection = self._detector(view, expected, self._scale.search_factors)
         if self._is_distractor(detection):
             detection = self._detector.near(detection, expected.center)
+        if self._spared:
+            as_before = self._sighting(detection, expected, self._presence)
+            if self._monitor.beyond_doubt(as_before.evidence):
+                return as_before
         return self._weigh(view, detection, expected)
 
     def _is_distractor(self, detection: Detection) -> bool:
@@ -177,11 +198,16 @@ class Track:
         return self._monitor.similar(self._weigh(view, seen, box).evidence)
 
     def _weigh(self, view: FrameView, detection: Detection, box: BoundingBox) -> _Sighting:
-        """Return what speaks for a detection around a box."""
+        """Return a detection around a box, compared with the first frame."""
         presence = None if self._verification is None else self._verification(
             view, box.moved_to(detection.center))
+        return self._sighting(detection, box, presence)
+
+    def _sighting(self, detection: Detection, box: BoundingBox,
+                  presence: float | None) -> _Sighting:
+        """Return a detection around a box with all that speaks for it."""
         likeness = self._detector.likeness(detection) / self._first_likeness
-        expected = self._pursuit.expected(self._box, view.size)
+        expected = self._pursuit.expected(self._box, self._image_size)
         jump = math.dist(detection.center, expected.center) / expected.area**0.5
         return _Sighting(box, detection, Evidence(detection.sharpness, likeness, presence, jump))
 
@@ -237,6 +263,8 @@ class Track:
         detection = sighting.detection
         scale = self._scale.found_factor(detection.peak.scale_values)
         moved = clamp_box(sighting.box.moved_to(detection.center).scaled(scale), view.size)
+        if self._spared:
+            return moved
         return clamp_box(moved.scaled(self._scale.estimate(view, moved)), view.size)
 
     def _follow(self, view: FrameView, box: BoundingBox) -> None:
@@ -250,6 +278,6 @@ class Track:
     def _learn(self, view: FrameView, detection: Detection) -> None:
         """Store the sample; when it is time, train the filter and the scale estimator."""
         self._detector.remember(detection)
-        if self._frame % self._config.learning.update_interval == 0:
+        if self._trains:
             self._detector.train()
             self._scale.learn(view, self._box)
