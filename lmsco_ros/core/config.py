@@ -172,7 +172,7 @@ def _presets() -> Mapping[str, TrackerConfig]:
             features=(FeatureConfig((
                 ChannelConfig('appearance', power=0.5, layer='features'),
                 *HANDCRAFTED[0].channels), projection=32),),
-            sampling=SamplingConfig(patch_size_min=100, patch_size_max=100),
+            sampling=SamplingConfig(search_factor=4.0, patch_size_min=80, patch_size_max=80),
             learning=LearningConfig(iterations=1, gradient_steps=1, update_interval=2),
             scale=ScaleConfig(step=1.03, exponent_min=-5, exponent_max=5, learning_rate=0.3,
                               slow_share=0.3, model_area=1024.0, label_sigma=1.5,
