@@ -37,11 +37,9 @@ import yaml
 
 from lmsco_ros.core import BoundingBox, LMSCOError, TrackerConfig
 from lmsco_ros.core.backend import limit_threads, select_backend
-from lmsco_ros.core.confidence import Evidence
-from lmsco_ros.core.detection import Detection
 from lmsco_ros.core.networks import load_networks
 from lmsco_ros.core.sampling import FrameView
-from lmsco_ros.core.track import Track
+from lmsco_ros.core.track import Sighting, Track
 from lmsco_ros.core.trust import regressors
 from lmsco_ros.evaluation.challenges import apply_challenge
 from lmsco_ros.evaluation.datasets import scan_dataset, TrackingSequence
@@ -79,21 +77,18 @@ class Records:
 
 
 class RecordingTrack(Track):
-    """A track that keeps the evidence of what it sees first in each frame, and where that is."""
+    """A track that keeps what speaks for the place it looks at first in each frame."""
 
-    seen: tuple[Evidence, BoundingBox] | None = None
+    seen: tuple[tuple[float, float, float], BoundingBox] | None = None
 
-    def _weigh(self, view: FrameView, detection: Detection, expected: BoundingBox) -> Evidence:
-        """Return and keep what speaks for a detection."""
-        evidence = super()._weigh(view, detection, expected)
-        if self.seen is None:
-            self.seen = evidence, self._box.moved_to(detection.center)
-        return evidence
-
-    def hints(self, evidence: Evidence) -> tuple[float, float, float]:
-        """Return what the coefficients multiply."""
-        quality = self._monitor.quality(evidence.sharpness)
-        return regressors(quality, evidence.likeness, evidence.presence or 0.0)
+    def _look(self, view: FrameView, expected: BoundingBox) -> Sighting:
+        """Return the best detection; keep what the coefficients multiply, and where it is."""
+        sighting = super()._look(view, expected)
+        evidence = sighting.evidence
+        hints = regressors(self._monitor.quality(evidence.sharpness), evidence.likeness,
+                           evidence.presence or 0.0)
+        self.seen = hints, self._box.moved_to(sighting.detection.center)
+        return sighting
 
 
 def main() -> None:
@@ -142,8 +137,8 @@ def record(sequence: TrackingSequence, config: TrackerConfig) -> Records:
         track.seen = None
         track.advance(image)
         if track.seen is not None:
-            evidence, box = track.seen
-            hints.append(track.hints(evidence))
+            seen, box = track.seen
+            hints.append(seen)
             overlaps.append(0.0 if absent[frame] else box.overlap(BoundingBox(*truth[frame])))
     return Records(np.array(hints).reshape(-1, 3), np.array(overlaps))
 

@@ -36,7 +36,7 @@ from lmsco_ros.core.scale import make_scale_estimator, steady
 from lmsco_ros.core.types import BoundingBox, TrackResult, TrackState
 from lmsco_ros.core.verification import Verification
 
-__all__ = ['Track']
+__all__ = ['Sighting', 'Track']
 
 # Searches in which all salient places get their turn; odd, since later every other frame has one.
 _TURNS = 3
@@ -46,7 +46,7 @@ _CUT_SCALES = (1.0, 0.7, 1.4)
 
 
 @dataclass(frozen=True)
-class _Sighting:
+class Sighting:
     """
     Something that may be the target.
 
@@ -176,7 +176,7 @@ class Track:
         self._pursuit.cut()
         self._distractors.forget()
 
-    def _look(self, view: FrameView, expected: BoundingBox) -> _Sighting:
+    def _look(self, view: FrameView, expected: BoundingBox) -> Sighting:
         """Return the best detection, or where the target is expected if that is a distractor."""
         self._distractors.next_frame()
         detection = self._detector(view, expected, self._scale.search_factors)
@@ -197,22 +197,22 @@ class Track:
         seen = self._detector.near(self._detector(view, box), box.center)
         return self._monitor.similar(self._weigh(view, seen, box).evidence)
 
-    def _weigh(self, view: FrameView, detection: Detection, box: BoundingBox) -> _Sighting:
+    def _weigh(self, view: FrameView, detection: Detection, box: BoundingBox) -> Sighting:
         """Return a detection around a box, compared with the first frame."""
         presence = None if self._verification is None else self._verification(
             view, box.moved_to(detection.center))
         return self._sighting(detection, box, presence)
 
     def _sighting(self, detection: Detection, box: BoundingBox,
-                  presence: float | None) -> _Sighting:
+                  presence: float | None) -> Sighting:
         """Return a detection around a box with all that speaks for it."""
         likeness = self._detector.likeness(detection) / self._first_likeness
         expected = self._pursuit.expected(self._box, self._image_size)
         jump = math.dist(detection.center, expected.center) / expected.area**0.5
-        return _Sighting(box, detection, Evidence(detection.sharpness, likeness, presence, jump))
+        return Sighting(box, detection, Evidence(detection.sharpness, likeness, presence, jump))
 
     def _search_elsewhere(self, view: FrameView, expected: BoundingBox,
-                          here: _Sighting) -> _Sighting:
+                          here: Sighting) -> Sighting:
         """Return what convinces most in other places of the image, or what is here."""
         # A distractor has to be watched, or it gets away from its place and looks new.
         for place in self._distractors.places:
@@ -233,7 +233,7 @@ class Track:
                 return other
         return here
 
-    def _search_salient(self, view: FrameView, expected: BoundingBox) -> list[_Sighting]:
+    def _search_salient(self, view: FrameView, expected: BoundingBox) -> list[Sighting]:
         """Return what is at the salient places whose turn it is."""
         count = self._config.confidence.candidates
         if not count:
@@ -245,7 +245,7 @@ class Track:
                 for box in found[first:first + count]]
 
     def _search_tiles(self, view: FrameView, expected: BoundingBox,
-                      side: float) -> list[_Sighting]:
+                      side: float) -> list[Sighting]:
         """Return the sharpest detection in the regions whose turn it is."""
         # While the shutter was closed the target may have got further than in a frame.
         slices = 2 if self._frozen else 1
@@ -258,7 +258,7 @@ class Track:
         box = expected.moved_to(sharpest.center)
         return [self._weigh(view, self._detector(view, box), box)]
 
-    def _resized(self, view: FrameView, sighting: _Sighting) -> BoundingBox:
+    def _resized(self, view: FrameView, sighting: Sighting) -> BoundingBox:
         """Return the box at a sighting, in the size of the target there."""
         detection = sighting.detection
         scale = self._scale.found_factor(detection.peak.scale_values)

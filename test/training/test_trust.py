@@ -1,0 +1,60 @@
+# Copyright 2026 lmsco_ros contributors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""What the trust in a detection is fitted to, and the fit."""
+
+import numpy as np
+import pytest
+
+from lmsco_ros.core import TrackerConfig
+from lmsco_ros.evaluation.datasets import TrackingSequence
+from training.trust import fit, record, Records, separation
+
+ABSENT = range(12, 18)
+
+
+@pytest.fixture
+def sequence(spot):
+    """Return a target that moves, and is not there in some frames."""
+    centers = [(60 + 1.5 * n, 70 + n) for n in range(24)]
+    rng = np.random.default_rng(1)
+    noise = rng.integers(0, 4, (24, 160, 200)).astype(np.uint8)
+    frames = [20 + noise[n] if n in ABSENT else spot(center) + noise[n]
+              for n, center in enumerate(centers)]
+    truth = np.array([[x - 18, y - 12, 36, 24] for x, y in centers], float)
+    truth[list(ABSENT)] = np.nan
+    return TrackingSequence('up', 'made', frames, truth)
+
+
+def test_record_tells_what_spoke_for_every_frame_after_the_first(sequence):
+    records = record(sequence, TrackerConfig.preset('default'))
+    absent = np.isin(np.arange(1, 24), ABSENT)
+    assert records.hints.shape == (23, 3) and records.overlap.shape == (23,)
+    assert np.all(records.overlap[absent] == 0)
+    there = records.overlap > 0.5
+    assert there[:11].all()
+    assert np.all(records.hints[absent].max(axis=0) < records.hints[:11].min(axis=0))
+
+
+def test_fit_separates_what_can_be_separated():
+    rng = np.random.default_rng(3)
+    overlap = np.repeat([0.8, 0.0, 0.3], 100)
+    hints = rng.normal(0, 1, (300, 3))
+    hints[:100, 1] += 4
+    hints[200:] = 50.0
+    records = [Records(hints, overlap)]
+    weights = fit(records, [0, 1, 2])
+    assert weights[1] > 3 * max(abs(weights[0]), abs(weights[2]))
+    assert separation(records, [0, 1, 2], weights) > 0.98
+    assert separation(records, [0], weights[[0, 3]]) < 0.7
