@@ -176,7 +176,7 @@ def _presets() -> Mapping[str, TrackerConfig]:
             learning=LearningConfig(iterations=1, gradient_steps=1, update_interval=2),
             scale=ScaleConfig(step=1.03, exponent_min=-5, exponent_max=5, learning_rate=0.3,
                               slow_share=0.3, model_area=1024.0, label_sigma=1.5,
-                              tolerance=0.5),
+                              damping=20.0, tolerance=0.5),
             verification=VerificationConfig('verification')),
         'paper': paper,
         'mas': paper,

@@ -28,8 +28,8 @@ from lmsco_ros.core.features.hog import hog
 from lmsco_ros.core.sampling import FrameView
 from lmsco_ros.core.types import BoundingBox
 
-__all__ = ['FixedScale', 'ScaleEstimator', 'ScaleFilter', 'ScaleSearch', 'make_scale_estimator',
-           'scale_factors', 'steady']
+__all__ = ['FixedScale', 'ScaleEstimator', 'ScaleFilter', 'ScaleSearch', 'credible_change',
+           'make_scale_estimator', 'scale_factors', 'steady']
 
 _CELL = 4
 
@@ -181,6 +181,27 @@ class ScaleFilter(FixedScale):
             box.center, (self._largest * box.width, self._largest * box.height))
         rows = self._rows @ view.patch(region, self._pixels)
         return rows.reshape(len(self._columns), self._model[1], -1) @ self._columns
+
+
+def credible_change(factor: float, box: BoundingBox, damping: float) -> float:
+    """
+    Return the part of a measured change of size that is believed.
+
+    The error of the measurement is about the same part of a pixel for all targets, so relative to
+    the size it grows as that shrinks; changes from one frame to the next are relative. The best
+    linear estimate (Wiener) takes the share s^2 / (s^2 + damping^2) of the logarithm.
+
+    Parameters
+    ----------
+    factor : float
+        Measured size over the last one.
+    box : BoundingBox
+        Target in the last size; s is the side of a square of its area, in pixels.
+    damping : float
+        Side in pixels of a target of whose measured change one half is believed.
+
+    """
+    return factor**(box.area / (box.area + damping**2))
 
 
 def steady(box: BoundingBox, first: tuple[float, float], tolerance: float) -> BoundingBox:

@@ -32,7 +32,7 @@ from lmsco_ros.core.networks import Networks
 from lmsco_ros.core.pursuit import Pursuit
 from lmsco_ros.core.salience import Salience
 from lmsco_ros.core.sampling import check_box, clamp_box, FrameView, visible_part
-from lmsco_ros.core.scale import make_scale_estimator, steady
+from lmsco_ros.core.scale import credible_change, make_scale_estimator, steady
 from lmsco_ros.core.types import BoundingBox, TrackResult, TrackState
 from lmsco_ros.core.verification import Verification
 
@@ -160,7 +160,7 @@ class Track:
 
     @property
     def _spared(self) -> bool:
-        """Whether this frame, which trains, leaves what can wait to the next one."""
+        """Whether this frame, which trains, leaves the comparison to the next one."""
         return self._trains and self._config.learning.update_interval > 1
 
     def _describe(self, detection: Detection, score: float, state: TrackState) -> TrackResult:
@@ -263,9 +263,9 @@ class Track:
         detection = sighting.detection
         scale = self._scale.found_factor(detection.peak.scale_values)
         moved = clamp_box(sighting.box.moved_to(detection.center).scaled(scale), view.size)
-        if self._spared:
-            return moved
-        return clamp_box(moved.scaled(self._scale.estimate(view, moved)), view.size)
+        change = self._scale.estimate(view, moved)
+        change = credible_change(change, moved, self._config.scale.damping)
+        return clamp_box(moved.scaled(change), view.size)
 
     def _follow(self, view: FrameView, box: BoundingBox) -> None:
         """Move to where the target is."""

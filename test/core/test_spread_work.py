@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""A frame that trains leaves comparison and scale to the next one, unless there is doubt."""
+"""A frame that trains leaves the comparison to the next one, unless there is doubt."""
 
 from collections import Counter
 
@@ -68,7 +68,7 @@ def resting(make_scene):
 
 def test_frames_take_turns(done, resting):
     works, result = work(done, 2, resting)
-    assert works == 4 * [{'compared': 1, 'scaled': 1}, {'trained': 1}]
+    assert works == 4 * [{'compared': 1, 'scaled': 1}, {'scaled': 1, 'trained': 1}]
     assert result.state is TrackState.TRACKING
 
 

@@ -53,6 +53,9 @@ class ScaleConfig:
         Ridge term of the scale filter.
     label_sigma : float
         Standard deviation of its label, in scales.
+    damping : float
+        Side of a target, in pixels, of whose measured change from one frame to the next one half is
+        believed: more of a larger one, less of a smaller one.
     tolerance : float
         Change of the size, in pixels of the side, that is taken for an error of measurement: the
         box is given with that much less of it.
@@ -70,6 +73,7 @@ class ScaleConfig:
     padding: float = 1.0
     regularization: float = 0.01
     label_sigma: float = 1.0
+    damping: float = 0.0
     tolerance: float = 0.0
 
     def __post_init__(self) -> None:
@@ -85,6 +89,7 @@ class ScaleConfig:
         check_range(self, 'padding', 1, 4)
         check_range(self, 'regularization', 0, 100, open_low=True)
         check_range(self, 'label_sigma', 0, 50, open_low=True)
+        check_range(self, 'damping', 0, 1000)
         check_range(self, 'tolerance', 0, 10)
         reach = self.step**max(self.exponent_max, -self.exponent_min)
         if reach > _LARGEST_SCALE:
