@@ -54,8 +54,8 @@ class ScaleConfig:
     label_sigma : float
         Standard deviation of its label, in scales.
     damping : float
-        Side of a target, in pixels, of whose measured change from one frame to the next one half is
-        believed: more of a larger one, less of a smaller one.
+        Side of a target, in pixels, of whose measured change from one frame to the next one half
+        is believed: more of a larger one, less of a smaller one.
     tolerance : float
         Change of the size, in pixels of the side, that is taken for an error of measurement: the
         box is given with that much less of it.
