@@ -21,7 +21,7 @@ from lmsco_ros.synthetic import render_scene, SceneConfig
 
 
 def test_walker_that_comes_nearer_and_goes_away_is_followed_in_size():
-    """It grows to twice its height within eight seconds and shrinks again, behind a post and past a twin."""
+    """Its height doubles within eight seconds and halves again; a post and a twin are near."""
     first, *frames = render_scene(SceneConfig())
     tracker = LMSCOTracker()
     tracker.initialize(first.image, first.box)
