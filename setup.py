@@ -25,7 +25,7 @@ setup(
     version='0.1.0',
     packages=find_packages(include=[f'{PACKAGE}*', 'msg_adapters*']),
     package_data={PACKAGE: [
-        'core/backbones/*.safetensors',
+        'core/weights/*.safetensors',
         'evaluation/**/*.html',
         'evaluation/**/*.txt',
         'evaluation/**/*.yaml',

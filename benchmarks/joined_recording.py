@@ -27,7 +27,7 @@ import numpy as np
 import numpy.typing as npt
 
 from lmsco_ros.core import BoundingBox
-from lmsco_ros.core.probe import to_gray
+from lmsco_ros.core.imaging.pixels import to_gray
 from lmsco_ros.evaluation.challenges import apply_challenge
 from lmsco_ros.evaluation.datasets import TrackingSequence
 from lmsco_ros.evaluation.errors import SequenceError

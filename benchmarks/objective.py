@@ -38,9 +38,10 @@ import numpy as np
 
 from benchmarks.measurement import load_config, markdown_table, positive
 from benchmarks.scenes import Clip, recorded_clips, walking_scene
-from lmsco_ros.core import detection, LMSCOTracker, TrackerConfig
+from lmsco_ros.core import LMSCOTracker, TrackerConfig
 from lmsco_ros.core.backend import Array, Backend
 from lmsco_ros.core.config import LearningConfig
+from lmsco_ros.core.detection import detector
 from lmsco_ros.core.learning.structured_operator import StructuredOperator
 from lmsco_ros.evaluation.report.style import looks, style_axes
 from lmsco_ros.evaluation.session import Request
@@ -124,7 +125,7 @@ def record_lesson(config: TrackerConfig, clip: Clip) -> Lesson:
 
     samples = {}
     tracker = LMSCOTracker(config)
-    with patch.object(detection, 'StructuredOperator', Recorder):
+    with patch.object(detector, 'StructuredOperator', Recorder):
         tracker.initialize(clip.frames[0], clip.start)
     for number, frame in enumerate(clip.frames[1:], start=1):
         known = len(stored)

@@ -38,7 +38,7 @@ from benchmarks.profiling import amortized, floor_table, profile_track, stage_ta
 from benchmarks.scenes import moving_scene
 from benchmarks.stages import FORWARD
 from lmsco_ros.core import TrackerConfig
-from lmsco_ros.core.backbones.registry import find_source
+from lmsco_ros.core.weights.registry import find_source
 
 AIM = 1.3
 

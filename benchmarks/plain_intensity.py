@@ -31,7 +31,7 @@ import numpy.typing as npt
 
 from lmsco_ros.core import BoundingBox, track, TrackerConfig
 from lmsco_ros.core.config import IntensityConfig
-from lmsco_ros.core.intensity import AutomaticGain, FrameCondition, IntensityRange
+from lmsco_ros.core.imaging.gain import AutomaticGain, FrameCondition, IntensityRange
 from lmsco_ros.evaluation.trackers.configured import ConfiguredTracker
 
 __all__ = ['first_range', 'min_max']

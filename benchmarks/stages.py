@@ -27,8 +27,8 @@ from typing import Any
 import scipy.fft
 import torch
 
-from lmsco_ros.core.backbones import registry
-from lmsco_ros.core.backbones.backbone import Backbone
+from lmsco_ros.core.networks.backbone import Backbone
+from lmsco_ros.core.weights import registry
 
 __all__ = ['CallRecorder', 'FORWARD', 'FOURIER', 'STAGES', 'Stage', 'StageClock', 'TRAINING',
            'instrumented']
@@ -80,19 +80,19 @@ class Stage:
 
 # A stage counts its own time only: a patch taken for the scale belongs to `patch`.
 STAGES = (
-    Stage('gain', 'intensity', 'AutomaticGain.examine'),
-    Stage('patch', 'sampling', 'FrameView.patch'),
+    Stage('gain', 'imaging.gain', 'AutomaticGain.examine'),
+    Stage('patch', 'imaging.frame', 'FrameView.patch'),
     Stage('motion', 'features.motion', 'MotionObserver.images'),
     Stage('optical flow', 'features.optical_flow', 'DenseFlow.__call__'),
     Stage('network in and out', 'features.network_channels', 'NetworkChannels.__call__'),
     Stage('features', 'features.extractor', 'FeatureExtractor.__call__'),
     Stage('scores', 'learning.structured_operator', 'StructuredOperator.scores'),
-    Stage('peak', 'detection', 'locate'),
-    Stage('sharpness', 'detection', 'peak_to_sidelobe_ratio'),
-    Stage('scale', 'scale', 'ScaleFilter.estimate'),
-    Stage('scale training', 'scale', 'ScaleFilter.learn'),
-    Stage('verification', 'verification', 'Verification.__call__'),
-    Stage('sample', 'detection', 'Detection.recentered_sample'),
+    Stage('peak', 'detection.detector', 'locate'),
+    Stage('sharpness', 'detection.detector', 'peak_to_sidelobe_ratio'),
+    Stage('scale', 'detection.scale', 'ScaleFilter.estimate'),
+    Stage('scale training', 'detection.scale', 'ScaleFilter.learn'),
+    Stage('comparison', 'presence.comparison', 'Comparison.__call__'),
+    Stage('sample', 'detection.detector', 'Detection.recentered_sample'),
     Stage('memory', 'learning.structured_operator', 'StructuredOperator.remember'),
     Stage(TRAINING, 'learning.structured_operator', 'StructuredOperator.train'),
 )

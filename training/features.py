@@ -22,7 +22,7 @@ from dataclasses import dataclass
 import numpy as np
 import torch
 
-from lmsco_ros.core.backbones.backbone import Backbone
+from lmsco_ros.core.networks.backbone import Backbone
 from training.correlation_filter import CorrelationFilter, margin_loss
 from training.examples import ExampleSource, Spread
 from training.flow_examples import FlowSource

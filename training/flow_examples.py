@@ -20,9 +20,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from lmsco_ros.core.config import MotionConfig, SamplingConfig
 from lmsco_ros.core.features.motion import MotionObserver
-from lmsco_ros.core.sampling import region_around
-from lmsco_ros.core.sections import MotionConfig, SamplingConfig
+from lmsco_ros.core.imaging.regions import region_around
 from training.examples import Example, jitter, offset_of, Spread
 from training.sources import Clip
 

@@ -27,7 +27,7 @@ from typing import Protocol
 import numpy as np
 import torch
 
-from lmsco_ros.core.backbones.formats import write_arrays
+from lmsco_ros.core.weights.formats import write_arrays
 
 __all__ = ['Batch', 'Objective', 'Schedule', 'train']
 

@@ -17,7 +17,7 @@ Train one of the bundled networks.
 
     python -m training.train NETWORK --data DATA [--output FOLDER] [--minutes N] [--device NAME]
 
-NETWORK is thermal, thermal_flow or verification; DATA holds `thermal_dev` and
+NETWORK is thermal, thermal_flow or comparison; DATA holds `thermal_dev` and
 `training_stills`. Written are NETWORK.safetensors, NETWORK_log.csv and NETWORK_curve.png.
 """
 
@@ -34,8 +34,9 @@ from matplotlib.figure import Figure
 import torch
 import yaml
 
-from lmsco_ros.core.backbones.thermal import ThermalFlowNet, ThermalNet
-from lmsco_ros.core.backbones.verification import VerificationNet
+from lmsco_ros.core.networks.comparison import ComparisonNet
+from lmsco_ros.core.networks.thermal import ThermalFlowNet, ThermalNet
+from training.comparison import comparison_batches, ComparisonObjective
 from training.correlation_filter import CorrelationFilter
 from training.examples import ExampleSource, Spread
 from training.features import feature_batches, FeatureObjective
@@ -43,7 +44,6 @@ from training.flow_examples import FlowSource
 from training.loop import Batch, Objective, Schedule, take, train
 from training.pairs import PairSource
 from training.sources import Clip, load_clips, load_stills, Still
-from training.verification import verification_batches, VerificationObjective
 
 CONFIG = Path(__file__).with_name('config.yaml')
 
@@ -54,7 +54,7 @@ Batches = Callable[[Source, int], Iterator[Batch]]
 def main() -> None:
     """Train the network that the command line names."""
     parser = argparse.ArgumentParser(description=__doc__.split('\n\n')[0])
-    parser.add_argument('network', choices=('thermal', 'thermal_flow', 'verification'))
+    parser.add_argument('network', choices=('thermal', 'thermal_flow', 'comparison'))
     parser.add_argument('--data', type=Path, required=True)
     parser.add_argument('--output', type=Path, default=Path('training/output'))
     parser.add_argument('--minutes', type=float)
@@ -103,8 +103,8 @@ def _parts(name: str, settings: Mapping[str, Any]) -> tuple[
         torch.nn.Module, Objective, Batches,
         Callable[[Sequence[Clip], Sequence[Still]], Source]]:
     """Return network, objective, batches of a source, and source of clips and stills."""
-    if name == 'verification':
-        return _verification(settings)
+    if name == 'comparison':
+        return _comparison(settings)
     correlation = CorrelationFilter(**settings['filter'])
     objective = FeatureObjective(correlation, settings['layer'], settings['core'])
     searched = Spread(**settings['searched'])
@@ -120,17 +120,17 @@ def _parts(name: str, settings: Mapping[str, Any]) -> tuple[
         clips, stills, size, factor, True, settings['clip_share'], settings['bystanders'])
 
 
-def _verification(settings: Mapping[str, Any]) -> tuple[
+def _comparison(settings: Mapping[str, Any]) -> tuple[
         torch.nn.Module, Objective, Batches,
         Callable[[Sequence[Clip], Sequence[Still]], Source]]:
-    """Return the parts of `_parts` for the verification network."""
-    network = VerificationNet()
+    """Return the parts of `_parts` for the comparison network."""
+    network = ComparisonNet()
     present = Spread(**settings['present'])
 
     def batches(source: Source, seed: int) -> Iterator[Batch]:
-        return verification_batches(source, settings['batch_size'], settings['shares'], seed)
+        return comparison_batches(source, settings['batch_size'], settings['shares'], seed)
 
-    return network, VerificationObjective(), batches, lambda clips, stills: PairSource(
+    return network, ComparisonObjective(), batches, lambda clips, stills: PairSource(
         clips, stills, network.size, network.context, settings['clip_share'], present,
         tuple(settings['near']))
 

@@ -13,11 +13,11 @@
 # limitations under the License.
 
 """
-Fit the coefficients of `lmsco_ros.core.trust`.
+Fit the coefficients of `lmsco_ros.core.presence.trust`.
 
     python -m training.trust --data DATA [--frames N]
 
-DATA holds `thermal_dev`. Every 5th clip of the train part, which the verification network never
+DATA holds `thermal_dev`. Every 5th clip of the train part, which the comparison network never
 saw, is tracked as it is and under the challenges that take the target away, move it, or set
 another one beside it. Printed are the coefficients, and for each challenge the chance that a
 detection on the target is trusted more than one off it.
@@ -37,10 +37,10 @@ import yaml
 
 from lmsco_ros.core import BoundingBox, LMSCOError, TrackerConfig
 from lmsco_ros.core.backend import limit_threads, select_backend
-from lmsco_ros.core.networks import load_networks
-from lmsco_ros.core.sampling import FrameView
-from lmsco_ros.core.track import Sighting, Track
-from lmsco_ros.core.trust import regressors
+from lmsco_ros.core.presence.observer import Outlook, Sighting
+from lmsco_ros.core.presence.trust import regressors
+from lmsco_ros.core.track import Track
+from lmsco_ros.core.weights.loading import load_networks
 from lmsco_ros.evaluation.challenges import apply_challenge
 from lmsco_ros.evaluation.datasets import scan_dataset, TrackingSequence
 from lmsco_ros.evaluation.errors import SequenceError
@@ -81,11 +81,11 @@ class RecordingTrack(Track):
 
     seen: tuple[tuple[float, float, float], BoundingBox] | None = None
 
-    def _look(self, view: FrameView, expected: BoundingBox) -> Sighting:
+    def _look(self, outlook: Outlook) -> Sighting:
         """Return the best detection; keep what the coefficients multiply, and where it is."""
-        sighting = super()._look(view, expected)
-        evidence = sighting.evidence
-        hints = regressors(self._monitor.quality(evidence.sharpness), evidence.likeness,
+        sighting = super()._look(outlook)
+        evidence = sighting.assessment.evidence
+        hints = regressors(sighting.assessment.quality, evidence.likeness,
                            evidence.presence or 0.0)
         self.seen = hints, self._box.moved_to(sighting.detection.center)
         return sighting
@@ -105,7 +105,7 @@ def main() -> None:
     records = {name: list(record_all(sequences, name)) for name in CHALLENGES}
     everything = [part for name, parts in records.items() if name not in COPIES
                   for part in parts]
-    for label, columns in (('VERIFIED', [0, 1, 2]), ('UNVERIFIED', [0, 1])):
+    for label, columns in (('COMPARED', [0, 1, 2]), ('UNCOMPARED', [0, 1])):
         weights = fit(everything, columns)
         print(label, ' '.join(f'{value:.2f}' for value in weights))
         for name, parts in records.items():

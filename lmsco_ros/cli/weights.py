@@ -42,8 +42,8 @@ def register(app: typer.Typer) -> None:
 
 def list_weights(directory: DirectoryOption = None) -> None:
     """Show all weights that have a name, and which of them are here."""
-    from lmsco_ros.core.backbones.registry import WEIGHTS
-    from lmsco_ros.core.backbones.weights import locate, weights_directory
+    from lmsco_ros.core.weights.registry import WEIGHTS
+    from lmsco_ros.core.weights.store import locate, weights_directory
 
     rows = []
     for source in WEIGHTS:
@@ -61,8 +61,8 @@ def fetch(
     force: Annotated[bool, typer.Option('--force', help='Also when they are here.')] = False,
 ) -> None:
     """Download weights; a download that was broken off goes on where it stopped."""
-    from lmsco_ros.core.backbones.registry import find_source
-    from lmsco_ros.core.backbones.weights import fetch_weights, locate, verify_weights
+    from lmsco_ros.core.weights.registry import find_source
+    from lmsco_ros.core.weights.store import fetch_weights, locate, verify_weights
 
     with plain_errors():
         source = find_source(name)
@@ -80,8 +80,8 @@ def fetch(
 
 def verify(name: NameArgument, directory: DirectoryOption = None) -> None:
     """Read weights in full and check that they are whole and fit their network."""
-    from lmsco_ros.core.backbones.registry import find_source
-    from lmsco_ros.core.backbones.weights import verify_weights
+    from lmsco_ros.core.weights.registry import find_source
+    from lmsco_ros.core.weights.store import verify_weights
 
     with plain_errors():
         found = verify_weights(name, directory)
@@ -98,7 +98,7 @@ def import_file(
     directory: DirectoryOption = None,
 ) -> None:
     """Convert a file that you have and put it where the tracker finds it."""
-    from lmsco_ros.core.backbones.weights import import_weights
+    from lmsco_ros.core.weights.store import import_weights
 
     with plain_errors():
         say(f'{name} is here: {import_weights(file, name, directory)}')

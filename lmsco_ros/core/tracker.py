@@ -26,10 +26,10 @@ import numpy as np
 from lmsco_ros.core.backend import limit_threads, select_backend
 from lmsco_ros.core.config import TrackerConfig
 from lmsco_ros.core.errors import ImageError, NotInitializedError
-from lmsco_ros.core.intensity import check_image
-from lmsco_ros.core.networks import load_networks
+from lmsco_ros.core.imaging.frame import check_image
 from lmsco_ros.core.track import Track
 from lmsco_ros.core.types import BoundingBox, TrackResult
+from lmsco_ros.core.weights.loading import load_networks
 
 __all__ = ['LMSCOTracker']
 

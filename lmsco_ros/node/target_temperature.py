@@ -21,7 +21,7 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
-from lmsco_ros.core.probe import measured
+from lmsco_ros.core.imaging.pixels import measured
 from msg_adapters.status import Reading
 
 

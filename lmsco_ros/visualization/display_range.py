@@ -20,7 +20,7 @@ import numpy as np
 import numpy.typing as npt
 
 from lmsco_ros.core.errors import ImageError
-from lmsco_ros.core.probe import measured
+from lmsco_ros.core.imaging.pixels import measured
 
 _PERCENTILES = (0.5, 99.5)
 # Share of the span left free below and above, so that a small hot target outside

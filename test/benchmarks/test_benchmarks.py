@@ -23,11 +23,11 @@ import pytest
 
 from benchmarks import measurement, paper_cost, scaling, scenes, side_by_side, stage_profile
 from benchmarks.profiling import amortized, FrameProfile, profile_track, REST
-from benchmarks.stages import CallRecorder, FORWARD, FOURIER, instrumented, StageClock, STAGES
-from benchmarks.stages import TRAINING
+from benchmarks.stages import (
+    CallRecorder, FORWARD, FOURIER, instrumented, StageClock, STAGES, TRAINING)
 from lmsco_ros.core import TrackerConfig
-from lmsco_ros.core.backbones.weights import load_backbone
 from lmsco_ros.core.features.extractor import FeatureExtractor
+from lmsco_ros.core.weights.store import load_backbone
 
 CONFIGURATIONS = Path(measurement.__file__).with_name('configurations')
 

@@ -20,7 +20,7 @@ import pytest
 from benchmarks.challenge_table import challenge_table, insert
 from benchmarks.plain_intensity import first_range, min_max
 from lmsco_ros.core import BoundingBox, LMSCOTracker, track
-from lmsco_ros.core.intensity import AutomaticGain
+from lmsco_ros.core.imaging.gain import AutomaticGain
 from lmsco_ros.evaluation.errors import DatasetError
 from lmsco_ros.evaluation.record_store import write_json
 from lmsco_ros.evaluation.run_file import SequenceInfo, write_run

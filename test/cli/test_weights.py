@@ -20,8 +20,8 @@ import hashlib
 import numpy as np
 import pytest
 
-from lmsco_ros.core.backbones import registry
-from lmsco_ros.core.backbones.squeezenet import SqueezeNet
+from lmsco_ros.core.networks.squeezenet import SqueezeNet
+from lmsco_ros.core.weights import registry
 
 NAME = 'squeezenet_v1.0'
 

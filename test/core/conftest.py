@@ -19,7 +19,7 @@ The references work with functions on a grid and explicit sums of exponentials; 
 code with the half spectra of the tracker.
 """
 
-from functools import partial
+from functools import cache, partial
 from types import SimpleNamespace
 
 import array_api_compat.numpy as numpy_namespace
@@ -329,6 +329,23 @@ def random_network():
 @pytest.fixture
 def random_weights(monkeypatch, random_network):
     """Let every name of the registry stand for its network with random weights."""
-    from lmsco_ros.core.backbones import weights
-    monkeypatch.setattr(weights, 'load_backbone', lambda name, directory=None: random_network(
-        weights.find_source(name).architecture))
+    from lmsco_ros.core.weights import store
+    monkeypatch.setattr(store, 'load_backbone', lambda name, directory=None: random_network(
+        store.find_source(name).architecture))
+
+
+@pytest.fixture(scope='session')
+def random_arrays():
+    """Return a function of network class to arrays as a file of its weights holds them."""
+    @cache
+    def make(architecture):
+        generator = np.random.default_rng(5)
+        arrays = {}
+        for name, shape in architecture.file_shapes().items():
+            if name == 'mean':
+                arrays[name] = np.array([90, 120, 140], np.float32)
+            else:
+                spread = (2 / np.prod(shape[1:]))**0.5 if len(shape) > 1 else 0.5
+                arrays[name] = generator.normal(0, spread, shape).astype(np.float32)
+        return arrays
+    return lambda architecture: dict(make(architecture))

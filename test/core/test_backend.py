@@ -21,8 +21,7 @@ import array_api_compat.numpy as numpy_namespace
 import numpy as np
 import pytest
 
-from lmsco_ros.core.backend import (
-    Backend, irfft2, real_matmul, rfft2, select_backend, to_numpy)
+from lmsco_ros.core.backend import Backend, irfft2, real_matmul, rfft2, select_backend, to_numpy
 from lmsco_ros.core.config import (
     ChannelConfig, FeatureConfig, LearningConfig, RuntimeConfig, TrackerConfig)
 from lmsco_ros.core.errors import ConfigError
@@ -30,7 +29,7 @@ from lmsco_ros.core.features.extractor import FeatureExtractor
 from lmsco_ros.core.fourier.localization import centered_map, locate
 from lmsco_ros.core.fourier.series import shift
 from lmsco_ros.core.learning.structured_operator import StructuredOperator
-from lmsco_ros.core.networks import Networks
+from lmsco_ros.core.weights.loading import Networks
 
 TOLERANCE = {'float32': 1e-4, 'float64': 1e-9}
 FEATURES = (FeatureConfig((ChannelConfig('hog'), ChannelConfig('intensity', 2.0)), cell=4),

@@ -25,9 +25,8 @@ from lmsco_ros.core import (
     BoundingBox, BoxError, ImageError, LMSCOError, LMSCOTracker, NotInitializedError,
     TrackerConfig, TrackResult, TrackState)
 from lmsco_ros.core.config import (
-    ChannelConfig, ConfidenceConfig, FeatureConfig, LearningConfig, SamplingConfig, ScaleConfig)
-from lmsco_ros.core.sampling import visible_part
-
+    ChannelConfig, FeatureConfig, LearningConfig, SamplingConfig, ScaleConfig, SearchConfig)
+from lmsco_ros.core.imaging.regions import visible_part
 
 # Small, since most of what is asked here does not depend on accuracy.
 FAST = TrackerConfig(
@@ -346,7 +345,7 @@ def test_every_way_of_learning_tracks(scene, learning):
         features=(FeatureConfig((ChannelConfig('hog'),), 4),
                   FeatureConfig((ChannelConfig('intensity'),), 4)),
         sampling=FAST.sampling, learning=learning, scale=ScaleConfig(estimator='none'),
-        confidence=ConfidenceConfig(tiles=0))
+        search=SearchConfig(tiles=0))
     last = walk(scene, 9, config)[-1]
     assert last.box.overlap(box_of((CENTER[0] + 8, CENTER[1]))) > 0.75
 

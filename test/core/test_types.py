@@ -21,8 +21,9 @@ from hypothesis import given, strategies as st
 import numpy as np
 import pytest
 
-from lmsco_ros.core import BoundingBox, BoxError, LMSCOError, TrackResult, TrackState
-from lmsco_ros.core import ConfigError, ImageError, NotInitializedError
+from lmsco_ros.core import (
+    BoundingBox, BoxError, ConfigError, ImageError, LMSCOError, NotInitializedError, TrackResult,
+    TrackState)
 
 coordinate = st.floats(-1e4, 1e4)
 length = st.floats(1e-2, 1e4)

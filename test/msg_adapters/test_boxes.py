@@ -25,9 +25,9 @@ from sensor_msgs.msg import RegionOfInterest
 from std_msgs.msg import Header
 from visualization_msgs.msg import ImageMarker
 
-from msg_adapters.boxes import (Box, box_from_polygon, box_from_region, boxes_from_detections,
-                                detections_available, detections_from_box, polygon_from_box,
-                                region_from_box)
+from msg_adapters.boxes import (
+    Box, box_from_polygon, box_from_region, boxes_from_detections, detections_available,
+    detections_from_box, polygon_from_box, region_from_box)
 from msg_adapters.errors import BoxMessageError
 from msg_adapters.markers import box_from_marker, marker_from_box, marker_removal
 

@@ -27,8 +27,9 @@ from std_msgs.msg import Header
 
 from msg_adapters.compressed_size import declared_size
 from msg_adapters.errors import ImageMessageError
-from msg_adapters.image import (compressed_from_image, ENCODINGS, image_from_compressed,
-                                image_from_message, message_from_image)
+from msg_adapters.image import (
+    compressed_from_image, ENCODINGS, image_from_compressed, image_from_message,
+    message_from_image)
 
 SIZES = st.tuples(st.integers(1, 12), st.integers(1, 12))
 

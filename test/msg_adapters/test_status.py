@@ -20,9 +20,9 @@ import pytest
 from std_msgs.msg import Header
 
 from msg_adapters.errors import StatusMessageError
-from msg_adapters.status import (diagnoses_from_message, Diagnosis, FrameStatus, FrameTimes,
-                                 Level, message_from_diagnoses, message_from_status, Reading,
-                                 status_from_message)
+from msg_adapters.status import (
+    diagnoses_from_message, Diagnosis, FrameStatus, FrameTimes, Level, message_from_diagnoses,
+    message_from_status, Reading, status_from_message)
 
 FINITE = st.floats(allow_nan=False, allow_infinity=False)
 STATUSES = st.builds(

@@ -114,8 +114,9 @@ def test_python_example_runs(tmp_path, monkeypatch, capsys):
 
 def test_commands_of_the_command_line_exist():
     """Each `lmsco` line names a command and only options that it has."""
-    from lmsco_ros.cli.main import build_app
     import typer
+
+    from lmsco_ros.cli.main import build_app
     commands = typer.main.get_command(build_app()).commands
     lines = re.findall(r'^lmsco (?!-)(\S+)(.*)$', '\n'.join(blocks('bash')), re.M)
     assert len(lines) >= 4

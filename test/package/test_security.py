@@ -77,8 +77,9 @@ def test_policy_is_written_as_sros2_reads_it(policy):
 def interface():
     """Return what the graph tells of the node, over all ways to configure it."""
     rclpy = pytest.importorskip('rclpy', reason='needs ROS 2')
-    from lmsco_ros.node.tracker_node import TrackerNode
     from rclpy.parameter import Parameter
+
+    from lmsco_ros.node.tracker_node import TrackerNode
     found = {'publish': set(), 'subscribe': set(), 'reply': set(), 'request': set()}
     for transport in ('raw', 'compressed'):
         context = rclpy.Context()

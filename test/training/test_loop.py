@@ -22,10 +22,10 @@ import pytest
 from safetensors.numpy import load_file
 import torch
 
-from lmsco_ros.core.backbones.formats import read_arrays
-from lmsco_ros.core.backbones.registry import find_source
-from lmsco_ros.core.backbones.thermal import ThermalNet
-from lmsco_ros.core.backbones.weights import fitting_arrays
+from lmsco_ros.core.networks.thermal import ThermalNet
+from lmsco_ros.core.weights.formats import read_arrays
+from lmsco_ros.core.weights.registry import find_source
+from lmsco_ros.core.weights.store import fitting_arrays
 from training.loop import Batch, Schedule, take, train
 
 SCHEDULE = Schedule(minutes=1e6, steps=60, learning_rate=0.1, weight_decay=0.0, log_interval=20,

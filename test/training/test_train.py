@@ -20,8 +20,8 @@ from dataclasses import replace
 import pytest
 import yaml
 
-from lmsco_ros.core.backbones.formats import read_arrays
-from lmsco_ros.core.backbones.thermal import ThermalNet
+from lmsco_ros.core.networks.thermal import ThermalNet
+from lmsco_ros.core.weights.formats import read_arrays
 from training.loop import Schedule
 from training.train import CONFIG, run
 

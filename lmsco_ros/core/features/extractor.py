@@ -23,13 +23,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from lmsco_ros.core.backend import Array, array_namespace, Backend
-from lmsco_ros.core.config import TrackerConfig
+from lmsco_ros.core.config import ChannelConfig, FeatureConfig, NETWORK_KINDS, TrackerConfig
 from lmsco_ros.core.features.hog import hog
 from lmsco_ros.core.features.intensity_channels import intensity_channels
 from lmsco_ros.core.features.projection import Projection
 from lmsco_ros.core.fourier.interpolation import interpolate, interpolation_series
-from lmsco_ros.core.networks import Networks
-from lmsco_ros.core.sections import ChannelConfig, FeatureConfig, NETWORK_KINDS
+from lmsco_ros.core.weights.loading import Networks
 
 if TYPE_CHECKING:
     from lmsco_ros.core.features.network_channels import NetworkChannels

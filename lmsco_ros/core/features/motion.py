@@ -21,8 +21,8 @@ from collections.abc import Sequence
 import cv2
 import numpy as np
 
+from lmsco_ros.core.config import MotionConfig
 from lmsco_ros.core.features.optical_flow import DenseFlow, flow_image, global_motion
-from lmsco_ros.core.sections import MotionConfig
 from lmsco_ros.core.types import BoundingBox
 
 __all__ = ['MotionObserver']

@@ -21,9 +21,9 @@ from collections.abc import Iterable
 import numpy as np
 import torch
 
-from lmsco_ros.core.backbones.backbone import Backbone
 from lmsco_ros.core.backend import Array, Backend
 from lmsco_ros.core.errors import ConfigError
+from lmsco_ros.core.networks.backbone import Backbone
 
 __all__ = ['NetworkChannels']
 

@@ -25,7 +25,7 @@ import numpy as np
 from lmsco_ros.core.backend import Array, to_numpy
 from lmsco_ros.core.fourier.series import bandwidth, grid_size, half_weights, synthesize
 
-__all__ = ['Peak', 'centered_map', 'locate', 'refine']
+__all__ = ['Peak', 'centered_map', 'locate', 'peak_to_sidelobe_ratio', 'refine']
 
 # In periods; the next step of Newton's method would be about the square of it.
 _SMALLEST_STEP = 1e-7
@@ -155,3 +155,31 @@ def centered_map(grid: np.ndarray) -> np.ndarray:
     """Return the score grid with the origin in the middle, as float32."""
     half = (grid.shape[0] // 2, grid.shape[1] // 2)
     return np.roll(grid, half, axis=(0, 1)).astype(np.float32)
+
+
+def peak_to_sidelobe_ratio(grid: np.ndarray, exclude: int) -> float:
+    """
+    Return (maximum - mean) / standard deviation, the latter two away from the peak.
+
+    Parameters
+    ----------
+    grid : ndarray, shape (n, n)
+        Scores, periodic.
+    exclude : int
+        Half side, in grid points, of the square around the peak that is not sidelobe.
+
+    Notes
+    -----
+    Bolme et al., MOSSE, CVPR 2010.
+
+    """
+    size = grid.shape[0]
+    row, column = np.unravel_index(np.argmax(grid), grid.shape)
+    around = np.arange(-exclude, exclude + 1)
+    values = grid.astype(np.float64)
+    square = values[((row + around) % size)[:, None], (column + around) % size]
+    count = values.size - square.size
+    mean = (values.sum() - square.sum()) / count
+    power = (np.vdot(values, values) - np.vdot(square, square)) / count
+    deviation = math.sqrt(max(power - mean**2, 0.0))
+    return float((grid[row, column] - mean) / deviation) if deviation > 0 else 0.0

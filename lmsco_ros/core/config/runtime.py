@@ -1,0 +1,45 @@
+# Copyright 2026 lmsco_ros contributors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Where the tracker computes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from lmsco_ros.core.config.validation import check_range
+
+__all__ = ['RuntimeConfig']
+
+
+@dataclass(frozen=True)
+class RuntimeConfig:
+    """
+    Where the tracker computes.
+
+    Attributes
+    ----------
+    device : str
+        'cpu', 'cuda' or 'cuda:N'.
+    threads : int
+        Threads of the numerical libraries in this process.
+
+    """
+
+    device: str = 'cpu'
+    threads: int = 1
+
+    def __post_init__(self) -> None:
+        """Check the ranges."""
+        check_range(self, 'threads', 1, 256)

@@ -1,0 +1,166 @@
+# Copyright 2026 lmsco_ros contributors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""A detection with all that speaks for it, told apart from distractors."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+import math
+
+from lmsco_ros.core.detection.detector import Detection, Detector
+from lmsco_ros.core.imaging.frame import FrameView
+from lmsco_ros.core.presence.comparison import Comparison
+from lmsco_ros.core.presence.distractors import Distractors
+from lmsco_ros.core.presence.evidence import Assessment, Evidence
+from lmsco_ros.core.presence.monitor import PresenceMonitor
+from lmsco_ros.core.types import BoundingBox
+
+__all__ = ['Observer', 'Outlook', 'Sighting']
+
+
+@dataclass(frozen=True)
+class Outlook:
+    """
+    A frame, before the target is looked for in it.
+
+    Attributes
+    ----------
+    view : FrameView
+        The frame.
+    last : BoundingBox
+        The target where it was seen last.
+    expected : BoundingBox
+        Where it is expected in this frame.
+
+    """
+
+    view: FrameView
+    last: BoundingBox
+    expected: BoundingBox
+
+
+@dataclass(frozen=True)
+class Sighting:
+    """
+    Something that may be the target.
+
+    Attributes
+    ----------
+    box : BoundingBox
+        Where it was looked for, in the size that it was taken to have.
+    detection : Detection
+        What the filter saw there.
+    assessment : Assessment
+        What speaks for it.
+
+    """
+
+    box: BoundingBox
+    detection: Detection
+    assessment: Assessment
+
+
+class Observer:
+    """
+    Looks with the filter, compares with the first frame, and knows the distractors.
+
+    Parameters
+    ----------
+    detector : Detector
+        Of the target.
+    comparison : Comparison or None
+        With the first frame; None where nothing is compared.
+    monitor : PresenceMonitor
+        Weighs the evidence.
+    first : Detection
+        What the detector sees in the first frame.
+
+    """
+
+    def __init__(self, detector: Detector, comparison: Comparison | None,
+                 monitor: PresenceMonitor, first: Detection) -> None:
+        self._detector = detector
+        self._comparison = comparison
+        self._monitor = monitor
+        self._distractors = Distractors()
+        self._first_likeness = detector.likeness(first)
+
+    def look(self, outlook: Outlook, factors: Sequence[float],
+             presence: float | None = None) -> Sighting:
+        """
+        Return what is around the expected place, or just there where that is a distractor.
+
+        Parameters
+        ----------
+        outlook : Outlook
+            The frame; called once for each.
+        factors : sequence of float
+            Scales at which the target is searched.
+        presence : float, optional
+            Comparison of the frame before, which stands for that of this frame as long as
+            nothing raises a doubt; by default the comparison is made.
+
+        """
+        self._distractors.next_frame()
+        detection = self._detector(outlook.view, outlook.expected, factors)
+        if self.is_distractor(outlook, detection):
+            detection = self._detector.near(detection, outlook.expected.center)
+        if presence is not None:
+            as_before = self._sighting(outlook, detection, outlook.expected, presence)
+            if self._monitor.beyond_doubt(as_before.assessment):
+                return as_before
+        return self.weigh(outlook, detection, outlook.expected)
+
+    def detect(self, outlook: Outlook, box: BoundingBox) -> Detection:
+        """Return what the filter sees around a box in its size."""
+        return self._detector(outlook.view, box)
+
+    def weigh(self, outlook: Outlook, detection: Detection, box: BoundingBox) -> Sighting:
+        """Return a detection around a box, compared with the first frame."""
+        presence = None if self._comparison is None else self._comparison(
+            outlook.view, box.moved_to(detection.center))
+        return self._sighting(outlook, detection, box, presence)
+
+    def is_distractor(self, outlook: Outlook, detection: Detection) -> bool:
+        """Return whether something else than the target was detected; if so, note its place."""
+        return self._distractors.explain(detection.center, outlook.last, self._resembles)
+
+    def follow_distractors(self, outlook: Outlook) -> None:
+        """Watch the known distractors, or they get away from their places and look new."""
+        for place in self._distractors.places:
+            self.is_distractor(outlook, self.detect(outlook, outlook.expected.moved_to(place)))
+
+    def keep(self, view: FrameView, box: BoundingBox) -> None:
+        """Keep a frame in which the target is certain, to see later what stood beside it."""
+        self._distractors.certain(view, box)
+
+    def forget(self) -> None:
+        """Forget what stood where: the view has changed."""
+        self._distractors.forget()
+
+    def _resembles(self, view: FrameView, box: BoundingBox) -> bool:
+        """Return whether a frame shows something like the target in a box."""
+        outlook = Outlook(view, box, box)
+        seen = self._detector.near(self.detect(outlook, box), box.center)
+        return self._monitor.resembles(self.weigh(outlook, seen, box).assessment.evidence)
+
+    def _sighting(self, outlook: Outlook, detection: Detection, box: BoundingBox,
+                  presence: float | None) -> Sighting:
+        """Return a detection around a box with all that speaks for it."""
+        likeness = self._detector.likeness(detection) / self._first_likeness
+        jump = math.dist(detection.center, outlook.expected.center) / outlook.expected.area**0.5
+        evidence = Evidence(detection.sharpness, likeness, presence, jump)
+        return Sighting(box, detection, self._monitor.assess(evidence))

@@ -1,0 +1,316 @@
+# Copyright 2026 lmsco_ros contributors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Configurations: round trips, bounds, and errors that say what to do."""
+
+from dataclasses import asdict, FrozenInstanceError, is_dataclass, replace
+
+from hypothesis import given, strategies as st
+import pytest
+import yaml
+
+from lmsco_ros.core import ConfigError, TrackerConfig
+from lmsco_ros.core.config import (
+    ChannelConfig, ComparisonConfig, FeatureConfig, IntensityConfig, LearningConfig, MotionConfig,
+    NetworkConfig, PresenceConfig, RuntimeConfig, SamplingConfig, ScaleConfig, SearchConfig)
+
+weights = st.floats(0.01, 100)
+words = st.text(st.characters(codec='utf-8', exclude_categories=['Cc', 'Cs']), min_size=1)
+channels = st.builds(ChannelConfig, st.sampled_from(['hog', 'intensity']), weights) | st.builds(
+    ChannelConfig, st.sampled_from(['appearance', 'motion']), weights, st.floats(0, 1), words)
+features = st.builds(
+    FeatureConfig, st.lists(channels, min_size=1, max_size=2).map(tuple),
+    cell=st.sampled_from([2, 4, 8]), projection=st.integers(0, 4096))
+configs = st.builds(
+    TrackerConfig,
+    features=st.lists(features, min_size=1, max_size=3).map(tuple).filter(
+        lambda blocks: {group.kind for block in blocks for group in block.channels} != {'motion'}),
+    intensity=st.builds(IntensityConfig, low_percentile=st.floats(0, 49),
+                        high_percentile=st.floats(51, 100), jump=st.floats(0, 1)),
+    sampling=st.builds(SamplingConfig, search_factor=st.floats(1.5, 10),
+                       patch_size_min=st.integers(64, 200),
+                       patch_size_max=st.integers(200, 1024)),
+    networks=st.builds(NetworkConfig, words, words, words | st.just('')),
+    motion=st.builds(MotionConfig, st.booleans(), st.floats(0, 100)),
+    comparison=st.builds(ComparisonConfig, words | st.just('')),
+    learning=st.builds(LearningConfig, anchor=st.sampled_from(['unit', 'coupled', 'frozen']),
+                       solve=st.sampled_from(['joint', 'per_block']), core=st.floats(0, 1),
+                       window_minimum=st.floats(1e-6, 1), window_edge=st.floats(1, 1e3),
+                       memory_size=st.integers(1, 1000)),
+    scale=st.builds(ScaleConfig, estimator=st.sampled_from(['filter', 'search', 'none']),
+                    step=st.floats(1.001, 1.15), exponent_min=st.integers(-9, 0),
+                    exponent_max=st.integers(0, 9)),
+    presence=st.builds(PresenceConfig, lost=st.floats(0, 0.1),
+                       uncertain=st.floats(0.1, 0.5), certain=st.floats(0.5, 1),
+                       found=st.floats(0.1, 1), sharp=st.floats(0, 2), alike=st.floats(-1, 2),
+                       learn=st.sampled_from(['tracking', 'always'])),
+    search=st.builds(SearchConfig, st.integers(0, 64), st.integers(0, 64)),
+    runtime=st.builds(RuntimeConfig, device=st.sampled_from(['cpu', 'cuda', 'cuda:1']),
+                      threads=st.integers(1, 256)),
+    newton_steps=st.integers(0, 100))
+
+
+@given(config=configs)
+def test_dictionary_round_trip(config):
+    assert TrackerConfig.from_dict(config.to_dict()) == config
+
+
+@given(config=configs)
+def test_plain_values_survive_yaml(config):
+    assert TrackerConfig.from_dict(yaml.safe_load(yaml.safe_dump(config.to_dict()))) == config
+
+
+def test_file_round_trip(tmp_path):
+    config = replace(TrackerConfig(), newton_steps=3, scale=ScaleConfig(step=1.07),
+                     features=(FeatureConfig((ChannelConfig('intensity', 0.5),), 8),
+                               FeatureConfig((ChannelConfig('hog'),), 4)))
+    config.to_yaml(tmp_path / 'c.yaml')
+    assert TrackerConfig.from_yaml(tmp_path / 'c.yaml') == config
+    assert TrackerConfig.from_yaml(str(tmp_path / 'c.yaml')) == config
+
+
+@pytest.mark.parametrize('name', TrackerConfig.preset_names())
+def test_presets_are_valid_and_plain(name):
+    config = TrackerConfig.preset(name)
+    assert TrackerConfig.from_dict({'preset': name}) == config
+    assert TrackerConfig.from_dict(config.to_dict()) == config
+
+
+def test_named_presets_exist():
+    assert {'default', 'paper', 'mas', 'ma', 'a', 'hcs'} == set(TrackerConfig.preset_names())
+    with pytest.raises(ConfigError, match="unknown preset 'hsc'; expected one of .*hcs"):
+        TrackerConfig.preset('hsc')
+    with pytest.raises(ConfigError, match='unknown preset'):
+        TrackerConfig.from_dict({'preset': 'nothing'})
+
+
+def differences(one, other):
+    """Return the settings in which two presets differ."""
+    one, other = (TrackerConfig.preset(name).to_dict() for name in (one, other))
+    return {name for name in one if one[name] != other[name]}
+
+
+def test_presets_of_the_ablation_are_one_factor_apart():
+    assert differences('paper', 'mas') == set()
+    assert differences('mas', 'ma') == {'scale'}
+    assert differences('ma', 'a') == {'features'}
+    assert differences('mas', 'hcs') == {'features'}
+    appearance, motion_too = (TrackerConfig.preset(name).features for name in ('a', 'ma'))
+    assert motion_too[:-1] == appearance
+    assert {group.kind for block in appearance for group in block.channels} == {'appearance'}
+    assert [group.kind for group in motion_too[-1].channels] == ['motion']
+    assert TrackerConfig.preset('ma').scale.estimator == 'none'
+    assert TrackerConfig.preset('paper').scale.estimator == 'search'
+
+
+def test_partial_configuration_changes_only_what_it_names():
+    base = TrackerConfig.preset('hcs')
+    changed = TrackerConfig.from_dict(
+        {'preset': 'hcs', 'learning': {'memory_size': 7}, 'newton_steps': 2})
+    assert changed == replace(base, newton_steps=2, learning=replace(base.learning, memory_size=7))
+
+
+def test_list_replaces_the_whole_list():
+    blocks = [{'channels': [{'kind': 'intensity'}], 'cell': 8}]
+    changed = TrackerConfig.from_dict({'features': blocks})
+    assert changed.features == (FeatureConfig((ChannelConfig('intensity'),), cell=8),)
+
+
+def test_empty_configuration_is_the_default(tmp_path):
+    assert TrackerConfig.from_dict({}) == TrackerConfig.preset('default')
+    (tmp_path / 'empty.yaml').write_text('')
+    assert TrackerConfig.from_yaml(tmp_path / 'empty.yaml') == TrackerConfig.preset('default')
+
+
+def test_whole_numbers_may_be_written_either_way():
+    config = TrackerConfig.from_dict({'learning': {'memory_size': 5.0}, 'scale': {'padding': 2}})
+    assert config.learning.memory_size == 5 and isinstance(config.learning.memory_size, int)
+    assert config.scale.padding == 2.0 and isinstance(config.scale.padding, float)
+
+
+def test_given_mapping_is_left_alone():
+    data = {'preset': 'hcs', 'scale': {'step': 1.1}}
+    TrackerConfig.from_dict(data)
+    assert data == {'preset': 'hcs', 'scale': {'step': 1.1}}
+
+
+@pytest.mark.parametrize('data, path, nearest', [
+    ({'lerning': {}}, 'lerning', 'learning'),
+    ({'learning': {'memory_sise': 3}}, 'learning.memory_sise', 'memory_size'),
+    ({'scale': {'exponent_mx': 3}}, 'scale.exponent_mx', 'exponent_max'),
+    ({'features': [{'channels': [], 'cels': 3}]}, r'features\[0\].cels', 'cell'),
+    ({'features': [{'channels': [{'knd': 'hog'}]}]},
+     r'features\[0\].channels\[0\].knd', 'kind'),
+    ({'features': [{'channels': [{'kind': 'motion', 'layr': 'deep'}]}]},
+     r'features\[0\].channels\[0\].layr', 'layer'),
+    ({'networks': {'motion_backbon': 'x'}}, 'networks.motion_backbon', 'motion_backbone'),
+    ({'motion': {'least_motoin': 1}}, 'motion.least_motoin', 'least_motion'),
+    ({'newton_step': 3}, 'newton_step', 'newton_steps'),
+    ({7: 3}, '7', ''),
+])
+def test_unknown_key_names_the_nearest(data, path, nearest):
+    with pytest.raises(ConfigError, match=f"unknown key '{path}'; did you mean '{nearest}"):
+        TrackerConfig.from_dict(data)
+
+
+@given(config=configs, section=st.sampled_from(
+    ['learning', 'scale', 'sampling', 'networks', 'motion']),
+       position=st.integers(0, 40), letter=st.sampled_from('qzx'))
+def test_misspelled_key_is_found_again(config, section, position, letter):
+    data = config.to_dict()
+    key = max(data[section], key=len)
+    wrong = key[:position] + letter + key[position:]
+    data[section][wrong] = data[section].pop(key)
+    with pytest.raises(ConfigError, match=f'{section}.{wrong}.*did you mean {key!r}'):
+        TrackerConfig.from_dict(data)
+
+
+@pytest.mark.parametrize('data, reason', [
+    ({'learning': {'memory_size': 2.5}}, 'learning.memory_size is 2.5; expected an? int'),
+    ({'learning': {'memory_size': '5'}}, "learning.memory_size is '5'; expected a int"),
+    ({'learning': {'memory_size': True}}, 'learning.memory_size is True; expected an? int'),
+    ({'learning': {'core': None}}, 'learning.core is None; expected a float'),
+    ({'learning': {'core': False}}, 'learning.core is False; expected a float'),
+    ({'learning': {'anchor': 3}}, 'learning.anchor is 3; expected a str'),
+    ({'learning': 3}, 'learning is 3; expected keys and values'),
+    ({'scale': {'step': [1.1]}}, r'scale.step is \[1.1\]; expected a float'),
+    ({'features': 'hog'}, "features is 'hog'; expected a list"),
+    ({'features': ['hog']}, r"features\[0\] is 'hog'; expected keys and values"),
+    ({'features': [{'channels': 'hog'}]}, r"features\[0\].channels is 'hog'; expected a list"),
+    ({'features': [{'channels': [3]}]}, r'channels\[0\] is 3; expected keys and values'),
+    ({'features': [{'channels': [{'kind': 3}]}]}, r'channels\[0\].kind is 3; expected a str'),
+    ({'networks': {'appearance_backbone': 3}}, 'appearance_backbone is 3; expected a str'),
+    ({'motion': {'remove_camera_motion': 1}}, 'remove_camera_motion is 1; expected a bool'),
+    ({'features': []}, 'features is empty; name at least one block'),
+])
+def test_wrong_types_are_refused(data, reason):
+    with pytest.raises(ConfigError, match=reason):
+        TrackerConfig.from_dict(data)
+
+
+# Section, field, a value below, and a value above the allowed range (None: there is no bound).
+BOUNDS = [
+    (IntensityConfig, 'low_percentile', -1, 50), (IntensityConfig, 'high_percentile', 50, 101),
+    (IntensityConfig, 'smoothing', 0, 1.1), (IntensityConfig, 'jump', -0.1, 1.1),
+    (SamplingConfig, 'search_factor', 1.4, 10.5), (SamplingConfig, 'patch_size_min', 31, 1025),
+    (SamplingConfig, 'patch_size_max', 31, 1025),
+    (LearningConfig, 'core', -0.1, 1.1), (LearningConfig, 'margin_weight', 0, 2e6),
+    (LearningConfig, 'label_sigma', 0, 1.1), (LearningConfig, 'window_minimum', 0, 1001),
+    (LearningConfig, 'window_edge', 0, 1001), (LearningConfig, 'window_sparsity', -0.1, 1.1),
+    (LearningConfig, 'memory_size', 0, 1001), (LearningConfig, 'learning_rate', -0.1, 0.6),
+    (LearningConfig, 'initial_iterations', 0, 1001), (LearningConfig, 'iterations', 0, 1001),
+    (LearningConfig, 'gradient_steps', 0, 1001), (LearningConfig, 'update_interval', 0, 1001),
+    (ScaleConfig, 'step', 1, 2.1), (ScaleConfig, 'exponent_min', -51, 1),
+    (ScaleConfig, 'exponent_max', -1, 51), (ScaleConfig, 'learning_rate', -0.1, 1.1),
+    (ScaleConfig, 'model_area', 63, 65537), (ScaleConfig, 'padding', 0.9, 4.1),
+    (ScaleConfig, 'regularization', 0, 101), (ScaleConfig, 'label_sigma', 0, 51),
+    (ScaleConfig, 'tolerance', -1, 11),
+    (MotionConfig, 'least_motion', -0.1, 101),
+    (PresenceConfig, 'found', 0.05, 1.1), (PresenceConfig, 'certain', 0.4, 1.1),
+    (PresenceConfig, 'sharp', -0.1, 2.1), (PresenceConfig, 'alike', -1.1, 2.1),
+    (PresenceConfig, 'reference_frames', 0, 1001), (PresenceConfig, 'lost_frames', 0, 1001),
+    (SearchConfig, 'candidates', -1, 65), (SearchConfig, 'tiles', -1, 65),
+    (RuntimeConfig, 'threads', 0, 257),
+    (TrackerConfig, 'newton_steps', -1, 101),
+]
+
+
+@pytest.mark.parametrize('kind, name, low, high', BOUNDS,
+                         ids=lambda v: v if isinstance(v, str) else getattr(v, '__name__', None))
+def test_bounds_name_the_field_the_value_and_the_range(kind, name, low, high):
+    for value in (low, high, float('nan'), float('inf')):
+        with pytest.raises(ConfigError) as caught:
+            kind(**{name: value})
+        assert f'{kind.__name__}.{name} is {value}; expected a value in ' in str(caught.value)
+
+
+@pytest.mark.parametrize('values', [
+    {'sampling': {'patch_size_min': 200, 'patch_size_max': 100}},
+    {'learning': {'window_minimum': 0.5, 'window_edge': 0.1}},
+    {'presence': {'lost': 0.5, 'uncertain': 0.3, 'found': 0.6}},
+    {'presence': {'lost': 0.5, 'uncertain': 0.6, 'found': 0.3}},
+    {'presence': {'uncertain': 0.5, 'certain': 0.3}},
+])
+def test_ranges_must_not_be_turned_round(values):
+    with pytest.raises(ConfigError, match='expected a value in'):
+        TrackerConfig.from_dict(values)
+
+
+@pytest.mark.parametrize('values, words', [
+    ({'sampling': {'patch_size_min': 64, 'patch_size_max': 64},
+      'features': [{'channels': [{'kind': 'hog'}], 'cell': 16}]}, '64 pixels .* cells of 16'),
+    ({'features': [{'channels': [{'kind': 'hog'}], 'cell': cell} for cell in (7, 11)]},
+     'cells of 77 pixels'),
+    ({'features': [{'channels': [{'kind': 'motion', 'layer': 'deep'}], 'cell': 16}]},
+     'motion channels only, which show nothing in the first frame; add a block of appearance'),
+    ({'scale': {'step': 2, 'exponent_max': 50}}, 'reach a factor of 1.1259e\\+15'),
+])
+def test_values_that_do_not_go_together_are_refused(values, words):
+    with pytest.raises(ConfigError, match=words):
+        TrackerConfig.from_dict(values)
+
+
+@pytest.mark.parametrize('section, name, choices', [
+    ('learning', 'anchor', 'unit, coupled, frozen'),
+    ('learning', 'solve', 'joint, per_block'),
+    ('scale', 'estimator', 'filter, search, none'),
+])
+def test_choices_are_listed(section, name, choices):
+    with pytest.raises(ConfigError, match=f"{name} is 'other'; expected one of {choices}"):
+        TrackerConfig.from_dict({section: {name: 'other'}})
+
+
+@pytest.mark.parametrize('block, reason', [
+    ({'channels': []}, 'channels is empty; name at least one'),
+    ({'channels': [{'kind': 'hog'}], 'cell': 0}, r'FeatureConfig.cell is 0; expected'),
+    ({'channels': [{'kind': 'hog'}], 'cell': 33}, r'FeatureConfig.cell is 33; expected'),
+    ({'channels': [{'kind': 'hog', 'weight': 0}]}, r'ChannelConfig.weight is 0.*; expected'),
+    ({'channels': [{'kind': 'hog'}], 'projection': -1}, r'FeatureConfig.projection is -1; exp'),
+    ({'channels': [{'kind': 'hog'}], 'projection': 4097}, r'projection is 4097; expected'),
+    ({'channels': [{'kind': 'color'}]},
+     "kind is 'color'; expected one of hog, intensity, appearance, motion"),
+    ({'channels': [{'kind': 'motion'}]}, "layer is '' for kind 'motion'; expected a layer such"),
+    ({'channels': [{'kind': 'hog', 'layer': 'deep'}]},
+     "layer is 'deep' for kind 'hog'; expected .*none for the others"),
+])
+def test_features_are_checked(block, reason):
+    with pytest.raises(ConfigError, match=reason):
+        TrackerConfig.from_dict({'features': [block]})
+
+
+@pytest.mark.parametrize('text, reason', [
+    ('- 1\n- 2\n', 'holds list; expected keys and values'),
+    ('a: [1,\n', '(?s)cannot read the configuration .*expected a readable YAML file'),
+    ('just words\n', 'holds str; expected keys and values'),
+    ('learning: {anchor: best}\n', "anchor is 'best'; expected one of"),
+])
+def test_broken_files_are_named(tmp_path, text, reason):
+    (tmp_path / 'broken.yaml').write_text(text)
+    with pytest.raises(ConfigError, match=reason):
+        TrackerConfig.from_yaml(tmp_path / 'broken.yaml')
+
+
+def test_missing_and_binary_files_are_named(tmp_path):
+    (tmp_path / 'binary.yaml').write_bytes(b'\xff\xfe\x00\x81')
+    for name in ('missing.yaml', 'binary.yaml'):
+        with pytest.raises(ConfigError, match=f'cannot read the configuration .*{name}'):
+            TrackerConfig.from_yaml(tmp_path / name)
+
+
+def test_configurations_do_not_change():
+    config = TrackerConfig()
+    for part in (config, *(v for v in vars(config).values() if is_dataclass(v))):
+        name = next(iter(asdict(part)))
+        with pytest.raises(FrozenInstanceError):
+            setattr(part, name, None)

@@ -1,0 +1,212 @@
+# Copyright 2026 lmsco_ros contributors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Sharpness of scores, and the decisions that follow from it."""
+
+from dataclasses import replace
+
+import pytest
+
+from lmsco_ros.core.config import PresenceConfig
+from lmsco_ros.core.presence.evidence import Evidence, Verdict
+from lmsco_ros.core.presence.monitor import PresenceMonitor
+from lmsco_ros.core.types import TrackState
+
+CONFIG = PresenceConfig(reference_frames=4, uncertain=0.5, certain=0.6, lost=0.2,
+                        lost_frames=3, found=0.8, sharp=0.4, alike=0.3)
+CLEAR = Evidence(10.0, presence=4.0)
+GONE = Evidence(1.0, likeness=0.0, presence=-5.0)
+
+
+def judge(monitor, evidence):
+    """Return the verdict on a frame."""
+    return monitor.judge(monitor.assess(evidence))
+
+
+def believable(monitor, evidence):
+    """Return whether a frame is believed to show the target."""
+    return monitor.believable(monitor.assess(evidence))
+
+
+def convincing(monitor, evidence):
+    """Return whether a frame would show the target anywhere."""
+    return monitor.convincing(monitor.assess(evidence))
+
+
+@pytest.fixture
+def monitor():
+    """Return a monitor whose reference is a sharpness of 10."""
+    result = PresenceMonitor(CONFIG)
+    for _ in range(4):
+        assert judge(result, CLEAR).state is TrackState.TRACKING
+    return result
+
+
+def at_score(monitor, score):
+    """Return evidence of a given score, by the sharpness alone."""
+    low, high = 0.2, 50.0
+    for _ in range(60):
+        middle = (low + high) / 2
+        below = monitor.assess(Evidence(middle, 0.5, 0.0)).score < score
+        low, high = (middle, high) if below else (low, middle)
+    return Evidence(high, 0.5, 0.0)
+
+
+def test_clear_frames_keep_tracking(monitor):
+    for sharpness in (9, 14, 6, 5.1):
+        verdict = judge(monitor, Evidence(sharpness, presence=4.0))
+        assert verdict.state is TrackState.TRACKING and verdict.believed and verdict.learns
+
+
+def test_doubtful_frame_is_believed_but_not_learned_from(monitor):
+    doubtful = at_score(monitor, 0.35)
+    score = monitor.assess(doubtful).score
+    assert judge(monitor, doubtful) == Verdict(score, TrackState.UNCERTAIN, True, False)
+
+
+def test_state_does_not_flicker_between_two_thresholds(monitor):
+    between = at_score(monitor, 0.55)
+    assert judge(monitor, between).state is TrackState.TRACKING
+    judge(monitor, at_score(monitor, 0.45))
+    assert judge(monitor, between).state is TrackState.UNCERTAIN
+    assert judge(monitor, at_score(monitor, 0.65)).state is TrackState.TRACKING
+    assert judge(monitor, between).state is TrackState.TRACKING
+
+
+def test_target_is_lost_after_enough_misses_in_a_row(monitor):
+    assert not believable(monitor, GONE)
+    states = [judge(monitor, GONE).state for _ in range(4)]
+    assert states == [TrackState.UNCERTAIN] * 2 + [TrackState.LOST] * 2
+
+
+def test_misses_must_be_in_a_row(monitor):
+    for _ in range(5):
+        assert judge(monitor, GONE).state is not TrackState.LOST
+        assert judge(monitor, GONE).state is not TrackState.LOST
+        assert judge(monitor, CLEAR).state is TrackState.TRACKING
+
+
+@pytest.mark.parametrize('lack', [
+    Evidence(10.0, 0.2, 4.0), Evidence(3.5, 1.0, 4.0), Evidence(10.0, 1.0, -0.1)],
+    ids=['first filter', 'filter', 'comparison'])
+def test_lost_target_is_found_when_all_three_agree(monitor, lack):
+    for _ in range(3):
+        judge(monitor, GONE)
+    assert not convincing(monitor, lack) and not believable(monitor, lack)
+    assert judge(monitor, lack).state is TrackState.LOST
+    assert convincing(monitor, CLEAR)
+    assert judge(monitor, CLEAR).state is TrackState.TRACKING
+
+
+def test_after_a_cut_the_target_has_to_convince_but_with_less(monitor):
+    weak = Evidence(3.5, 1.0, -0.5)
+    assert believable(monitor, weak) and not convincing(monitor, weak)
+    monitor.note_cut()
+    # Half of what convinces otherwise does now; what was enough to go on does not.
+    assert convincing(monitor, weak) and monitor.after_cut
+    doubtful = at_score(monitor, 0.55)
+    assert not believable(monitor, doubtful)
+    assert judge(monitor, weak).state is not TrackState.LOST
+    assert not monitor.after_cut and believable(monitor, doubtful)
+
+
+def test_what_a_cut_excuses_is_forgotten_in_time(monitor):
+    weak = Evidence(3.5, 1.0, -0.5)
+    monitor.note_cut()
+    for _ in range(99):
+        judge(monitor, GONE)
+    assert monitor.after_cut and convincing(monitor, weak)
+    assert judge(monitor, GONE).state is TrackState.LOST
+    assert not monitor.after_cut and not convincing(monitor, weak)
+    # Who convinces as at any other time is found.
+    assert judge(monitor, CLEAR).state is not TrackState.LOST
+
+
+def test_without_a_network_the_filters_have_to_agree(monitor):
+    for _ in range(3):
+        judge(monitor, GONE)
+    assert not convincing(monitor, Evidence(10.0, 0.2)) and not convincing(monitor, Evidence(3.5))
+    assert judge(monitor, Evidence(9.0)).state is TrackState.TRACKING
+
+
+def test_a_jump_needs_a_better_frame(monitor):
+    doubtful = at_score(monitor, 0.35)
+    assert believable(monitor, replace(doubtful, jump=0.9))
+    assert not believable(monitor, replace(doubtful, jump=1.1))
+    assert believable(monitor, replace(at_score(monitor, 0.51), jump=1.1))
+
+
+def test_monitor_that_always_learns_believes_everything_and_still_judges():
+    monitor = PresenceMonitor(replace(CONFIG, learn='always'))
+    judge(monitor, CLEAR)
+    states = []
+    for _ in range(3):
+        verdict = judge(monitor, GONE)
+        states.append(verdict.state)
+        assert verdict.believed and verdict.learns
+    assert states == [TrackState.UNCERTAIN] * 2 + [TrackState.LOST]
+
+
+def test_reference_is_the_median_of_the_first_frames_only(monitor):
+    for _ in range(50):
+        judge(monitor, Evidence(100.0, presence=4.0))
+    assert monitor.assess(Evidence(10.0)).quality == pytest.approx(1)
+    late = PresenceMonitor(CONFIG)
+    for sharpness in (8, 12, 100, 10):
+        judge(late, Evidence(sharpness, presence=4.0))
+    assert late.assess(Evidence(11.0)).quality == pytest.approx(1)
+
+
+def test_first_frame_is_believed():
+    assert believable(PresenceMonitor(CONFIG), Evidence(0.5))
+
+
+@pytest.mark.parametrize('sharpness', [0.0, -3.0, float('nan'), float('inf')])
+def test_frame_that_shows_nothing_is_not_believed_and_sets_no_reference(sharpness):
+    monitor = PresenceMonitor(CONFIG)
+    blank = Evidence(sharpness, presence=4.0)
+    assert monitor.assess(blank).score == 0 and not believable(monitor, blank)
+    assert judge(monitor, blank).state is not TrackState.TRACKING
+    judge(monitor, Evidence(8.0))
+    assert monitor.assess(Evidence(8.0)).quality == pytest.approx(1)
+
+
+def test_monitors_do_not_share_what_they_saw(monitor):
+    other = PresenceMonitor(CONFIG)
+    judge(other, Evidence(2.0, presence=4.0))
+    assert other.assess(Evidence(2.0)).quality == pytest.approx(1)
+    assert monitor.assess(Evidence(10.0)).quality == pytest.approx(1)
+
+
+def test_low_odds_of_a_target_followed_with_certainty_become_usual():
+    """A target that the network hardly knows stays TRACKING; what falls below that does not."""
+    monitor = PresenceMonitor(PresenceConfig())
+    odd = Evidence(10.0, likeness=1.0, presence=0.0)
+    before = monitor.assess(odd).score
+    for _ in range(120):
+        assert judge(monitor, odd).state is TrackState.TRACKING
+    assert monitor.assess(odd).score > before
+    assert monitor.assess(odd).presence == pytest.approx(4.0, abs=0.2)
+    gone = Evidence(1.5, likeness=0.1, presence=-6.0)
+    for _ in range(5):
+        state = judge(monitor, gone).state
+    assert state is TrackState.LOST
+    assert monitor.assess(odd).presence == pytest.approx(4.0, abs=0.2)
+
+
+def test_high_odds_are_no_measure_for_later_frames():
+    monitor = PresenceMonitor(PresenceConfig())
+    for _ in range(120):
+        judge(monitor, Evidence(10.0, presence=8.0))
+    assert monitor.assess(Evidence(10.0, presence=3.0)).presence == 3.0

@@ -1,0 +1,120 @@
+# Copyright 2026 lmsco_ros contributors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""What is said while the target is away, beside another one, or after a closed shutter."""
+
+import numpy as np
+import pytest
+
+from lmsco_ros.core import BoundingBox, LMSCOTracker, TrackerConfig, TrackState
+
+CONFIG = TrackerConfig.from_dict({
+    'features': [{'channels': [{'kind': 'hog'}, {'kind': 'intensity'}], 'cell': 4}],
+    'sampling': {'patch_size_min': 100, 'patch_size_max': 100},
+    'comparison': {'network': ''}})
+SIZE = (24.0, 18.0)
+START = (60.3, 64.4)
+
+
+@pytest.fixture(scope='module')
+def scene(make_scene):
+    return make_scene((240, 160))
+
+
+def started(scene, frame, config=CONFIG, count=6):
+    """Return a tracker that has followed a target at rest over some frames."""
+    tracker = LMSCOTracker(config)
+    tracker.initialize(frame(0), BoundingBox.from_center(START, SIZE))
+    for n in range(1, count):
+        assert tracker.update(frame(n)).state is TrackState.TRACKING
+    return tracker
+
+
+def resting(scene, center=START):
+    """Return frames of a target at rest before ground that moves a little."""
+    return lambda n: scene.frame(center, SIZE, pan=(n / 10, 0))
+
+
+def with_twin(scene, frame, offset=(50, 20)):
+    """Return frames with a second target beside the first one."""
+    alone, empty = scene.render(START, SIZE), scene.render()
+    difference = np.roll(alone - empty, offset[::-1], axis=(0, 1))
+    return lambda n: np.round(frame(n) + difference).astype(np.uint16)
+
+
+def test_twin_that_remains_is_not_taken_for_the_target(scene):
+    frame, gone = (with_twin(scene, part) for part in (resting(scene), resting(scene, None)))
+    tracker = started(scene, frame)
+    results = [tracker.update(gone(n)) for n in range(6, 26)]
+    assert TrackState.TRACKING not in {result.state for result in results}
+    assert results[-1].state is TrackState.LOST
+    back = [tracker.update(frame(n)) for n in range(26, 29)][-1]
+    assert back.state is TrackState.TRACKING
+    assert back.box.center == pytest.approx(START, abs=1.0)
+
+
+def test_target_that_jumps_where_nothing_was_is_followed(scene):
+    elsewhere = (START[0] + 50, START[1] + 20)
+    tracker = started(scene, resting(scene))
+    results = [tracker.update(resting(scene, elsewhere)(n)) for n in range(6, 12)]
+    assert results[-1].state is TrackState.TRACKING
+    assert results[-1].box.center == pytest.approx(elsewhere, abs=1.0)
+
+
+def test_target_of_another_view_is_found_soon(scene, make_scene):
+    other, elsewhere = make_scene((240, 160), 5), (START[0] + 110, START[1] + 40)
+    tracker = started(scene, resting(scene))
+    results = [tracker.update(resting(other, elsewhere)(n)) for n in range(6, 10)]
+    assert results[1].state is not TrackState.LOST
+    assert results[-1].state is TrackState.TRACKING
+    assert results[-1].box.center == pytest.approx(elsewhere, abs=1.5)
+
+
+def test_view_without_the_target_ends_in_lost(scene, make_scene):
+    other = make_scene((240, 160), 5)
+    tracker = started(scene, resting(scene))
+    results = [tracker.update(resting(other, None)(n)) for n in range(6, 16)]
+    assert results[-1].state is TrackState.LOST
+
+
+def test_target_leaves_the_image_and_comes_back(scene):
+    tracker = started(scene, resting(scene))
+    x = [START[0] - 5 * n for n in range(1, 26)]
+    away = [tracker.update(scene.frame((left, START[1]), SIZE, pan=(left / 50, 0))) for left in x]
+    for result in away:
+        assert result.box.x >= 0 and result.box.x + result.box.width <= 240
+    assert away[-1].state is TrackState.LOST
+    back = [tracker.update(scene.frame((left, START[1]), SIZE, pan=(left / 50 + 0.01, 0)))
+            for left in x[::-1]]
+    assert back[-1].state is TrackState.TRACKING
+    assert back[-1].box.center == pytest.approx((x[0], START[1]), abs=1.5)
+
+
+def test_target_that_got_away_behind_the_shutter_is_found_at_once(scene):
+    frame = resting(scene)
+    tracker = started(scene, frame)
+    for _ in range(10):
+        assert tracker.update(frame(5)).state is TrackState.TRACKING
+    elsewhere = (START[0] + 70, START[1] + 25)
+    result = tracker.update(resting(scene, elsewhere)(6))
+    assert result.state is TrackState.TRACKING
+    assert result.box.center == pytest.approx(elsewhere, abs=1.5)
+
+
+def test_paper_follows_every_frame(scene):
+    config = TrackerConfig.from_dict({
+        **CONFIG.to_dict(), 'presence': TrackerConfig.preset('paper').to_dict()['presence']})
+    tracker = started(scene, resting(scene), config)
+    boxes = [tracker.update(resting(scene, None)(n)).box for n in range(6, 12)]
+    assert len(set(boxes)) == len(boxes)

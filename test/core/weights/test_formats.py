@@ -1,0 +1,148 @@
+# Copyright 2026 lmsco_ros contributors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Every published format gives back what was written, and damaged files are refused."""
+
+import os
+
+import numpy as np
+import pytest
+from scipy.io import savemat
+import torch
+
+from lmsco_ros.core.errors import WeightsError
+from lmsco_ros.core.weights.formats import read_about, read_arrays, write_arrays
+
+
+@pytest.fixture
+def arrays(rng):
+    """Return the arrays of a small network with groups and with sizes of 1."""
+    shapes = {'conv1': (4, 3, 7, 5), 'conv2': (6, 2, 3, 3), 'last/part': (1, 6, 1, 1)}
+    result = {}
+    for name, shape in shapes.items():
+        result[f'{name}.weight'] = rng.normal(size=shape).astype(np.float32)
+        result[f'{name}.bias'] = rng.normal(size=shape[0]).astype(np.float32)
+    return result
+
+
+def test_what_is_written_is_read(file_format, arrays, write_file):
+    found = read_arrays(write_file(file_format, arrays))
+    assert found.keys() == arrays.keys()
+    for name, array in arrays.items():
+        np.testing.assert_array_equal(found[name], array, err_msg=name)
+
+
+def test_views_are_written_as_they_look(tmp_path, rng):
+    array = rng.normal(size=(4, 3, 5, 5)).astype(np.float32)[:, ::-1, 1:, ::2]
+    write_arrays(tmp_path / 'view.safetensors', {'view': array}, {})
+    np.testing.assert_array_equal(read_arrays(tmp_path / 'view.safetensors')['view'], array)
+
+
+@pytest.mark.parametrize('kind', ['matconvnet', 'old matconvnet'])
+def test_matconvnet_tells_the_mean_of_each_channel(kind, arrays, write_file):
+    mean = np.array([120.5, 110.25, 100], np.float32)
+    found = read_arrays(write_file(kind, {**arrays, 'mean': mean}))
+    np.testing.assert_allclose(found['mean'], mean)
+
+
+def test_mean_may_be_a_column(tmp_path):
+    cells = np.empty((1, 1), object)
+    cells[0, 0] = {'name': 'c', 'weights': np.zeros((1, 0), object)}
+    network = {'layers': cells,
+               'meta': {'normalization': {'averageImage': [[123.0], [117.0], [104.0]]}}}
+    savemat(tmp_path / 'network.mat', {'net': network})
+    found = read_arrays(tmp_path / 'network.mat')
+    np.testing.assert_array_equal(found['mean'], [123, 117, 104])
+
+
+@pytest.mark.parametrize('part', [0.0, 0.05, 0.3, 0.8, 0.999])
+def test_truncated_files_are_refused(file_format, part, arrays, write_file):
+    whole = write_file(file_format, arrays).read_bytes()
+    path = write_file(file_format, arrays, stem='truncated')
+    path.write_bytes(whole[:int(part * len(whole))])
+    with pytest.raises(WeightsError, match=f'{path}.*(again|damaged|no layer|state)'):
+        read_arrays(path)
+
+
+def test_files_of_something_else_are_refused(file_format, arrays, write_file, rng):
+    path = write_file(file_format, arrays)
+    path.write_bytes(rng.bytes(5000))
+    with pytest.raises(WeightsError, match=str(path)):
+        read_arrays(path)
+
+
+def test_unknown_suffix_is_told_with_the_known(tmp_path):
+    with pytest.raises(WeightsError, match=r'weights\.onnx.*\.safetensors, \.npz, .*\.caffemodel'):
+        read_arrays(tmp_path / 'weights.onnx')
+
+
+def test_changed_numbers_are_noticed(tmp_path, arrays):
+    path = tmp_path / 'changed.safetensors'
+    write_arrays(path, arrays, {'source': 'a test'})
+    assert read_about(path)['source'] == 'a test'
+    content = bytearray(path.read_bytes())
+    content[-10] ^= 1
+    path.write_bytes(content)
+    with pytest.raises(WeightsError, match='damaged'):
+        read_arrays(path)
+
+
+class Trap:
+    """Something that runs a command when it is unpickled carelessly."""
+
+    def __init__(self, mark):
+        self._mark = mark
+
+    def __reduce__(self):
+        return os.mkdir, (str(self._mark),)
+
+
+def test_code_in_files_is_not_run(tmp_path):
+    mark = tmp_path / 'it-ran'
+    torch.save({'conv1.weight': Trap(mark)}, tmp_path / 'trap.pth')
+    np.savez(tmp_path / 'trap.npz', weight=np.array([Trap(mark)], object))
+    for name, reason in (('trap.pth', 'more than tensors'), ('trap.npz', 'allow_pickle')):
+        with pytest.raises(WeightsError, match=reason):
+            read_arrays(tmp_path / name)
+    assert not mark.exists()
+
+
+def test_a_checkpoint_without_a_state_dictionary_is_refused(tmp_path):
+    torch.save([torch.zeros(3)], tmp_path / 'list.pth')
+    with pytest.raises(WeightsError, match='holds a list; expected a state dictionary'):
+        read_arrays(tmp_path / 'list.pth')
+
+
+def test_other_matlab_files_are_refused_with_a_remedy(tmp_path):
+    savemat(tmp_path / 'other.mat', {'layer': 1.0})
+    with pytest.raises(WeightsError, match='no variable `layers`; expected .* MatConvNet'):
+        read_arrays(tmp_path / 'other.mat')
+    newer = tmp_path / 'newer.mat'
+    newer.write_bytes(b'MATLAB 7.3 MAT-file'.ljust(124) + b'\x00\x02IM' + bytes(500))
+    with pytest.raises(WeightsError, match='save it with the option -v7'):
+        read_arrays(newer)
+
+
+def test_missing_file_is_told_as_such(file_format, arrays, write_file):
+    path = write_file(file_format, arrays)
+    path.unlink()
+    with pytest.raises(FileNotFoundError):
+        read_arrays(path)
+
+
+def test_half_a_conversion_leaves_nothing(tmp_path, arrays):
+    path = tmp_path / 'folder' / 'weights.safetensors'
+    with pytest.raises(TypeError):
+        write_arrays(path, arrays, {'number': 3})
+    assert list(path.parent.iterdir()) == []
