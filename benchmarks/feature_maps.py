@@ -34,9 +34,9 @@ from lmsco_ros.core import BoundingBox, LMSCOTracker, TrackerConfig, TrackResult
 from lmsco_ros.core.backend import select_backend, to_numpy
 from lmsco_ros.core.features.extractor import FeatureExtractor
 from lmsco_ros.core.fourier.series import grid_size, synthesize
-from lmsco_ros.core.imaging.frame import FrameView
 from lmsco_ros.core.imaging.gain import AutomaticGain
 from lmsco_ros.core.imaging.regions import patch_size
+from lmsco_ros.core.imaging.view import FrameView
 from lmsco_ros.core.weights.loading import load_networks
 from lmsco_ros.evaluation.datasets import scan_dataset, TrackingSequence
 

@@ -41,7 +41,7 @@ from benchmarks.scenes import Clip, recorded_clips, walking_scene
 from lmsco_ros.core import LMSCOTracker, TrackerConfig
 from lmsco_ros.core.backend import Array, Backend
 from lmsco_ros.core.config import LearningConfig
-from lmsco_ros.core.detection import detector
+from lmsco_ros.core.detection.detector import detector
 from lmsco_ros.core.learning.structured_operator import StructuredOperator
 from lmsco_ros.evaluation.report.style import looks, style_axes
 from lmsco_ros.evaluation.session import Request

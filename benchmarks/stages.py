@@ -81,7 +81,7 @@ class Stage:
 # A stage counts its own time only: a patch taken for the scale belongs to `patch`.
 STAGES = (
     Stage('gain', 'imaging.gain', 'AutomaticGain.examine'),
-    Stage('patch', 'imaging.frame', 'FrameView.patch'),
+    Stage('patch', 'imaging.view', 'FrameView.patch'),
     Stage('motion', 'features.motion', 'MotionObserver.images'),
     Stage('optical flow', 'features.optical_flow', 'DenseFlow.__call__'),
     Stage('network in and out', 'features.network_channels', 'NetworkChannels.__call__'),

@@ -22,7 +22,7 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-from lmsco_ros.core.imaging.frame import FrameView
+from lmsco_ros.core.imaging.view import FrameView
 from lmsco_ros.core.types import BoundingBox
 from lmsco_ros.evaluation.challenges.regions import without_region
 from training.degradations import degrade, occlude

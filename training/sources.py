@@ -26,9 +26,9 @@ import numpy as np
 import numpy.typing as npt
 
 from lmsco_ros.core.config import IntensityConfig
-from lmsco_ros.core.imaging.frame import FrameView
 from lmsco_ros.core.imaging.gain import AutomaticGain
 from lmsco_ros.core.imaging.pixels import to_gray
+from lmsco_ros.core.imaging.view import FrameView
 from lmsco_ros.core.types import BoundingBox
 from lmsco_ros.evaluation.datasets import scan_dataset
 from lmsco_ros.evaluation.geometry import is_absent

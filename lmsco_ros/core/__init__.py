@@ -16,12 +16,12 @@
 
 from lmsco_ros.core.config import TrackerConfig
 from lmsco_ros.core.errors import (
-    BoxError, ConfigError, ImageError, LMSCOError, NotInitializedError, WeightsError)
+    BoxError, BusyError, ConfigError, ImageError, LMSCOError, NotInitializedError, WeightsError)
 from lmsco_ros.core.tracker import LMSCOTracker
 from lmsco_ros.core.types import BoundingBox, TrackResult, TrackState
 
 __all__ = [
-    'BoundingBox', 'BoxError', 'ConfigError', 'ImageError', 'LMSCOError', 'LMSCOTracker',
-    'NotInitializedError', 'TrackerConfig', 'TrackResult', 'TrackState',
+    'BoundingBox', 'BoxError', 'BusyError', 'ConfigError', 'ImageError', 'LMSCOError',
+    'LMSCOTracker', 'NotInitializedError', 'TrackerConfig', 'TrackResult', 'TrackState',
     'WeightsError',
 ]

@@ -17,6 +17,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from importlib import import_module
 import sys
 from typing import Any
 
@@ -55,6 +56,10 @@ class Backend:
     namespace: Any
     device: Any
     dtype: str = 'float32'
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Copy and pickle the library by its name: modules cannot be."""
+        return _backend_of, (self.namespace.__name__, str(self.device), self.dtype)
 
     @property
     def real(self) -> Any:
@@ -97,6 +102,14 @@ def select_backend(device_name: str, dtype: str = 'float32') -> Backend:
         raise ConfigError(f'device {device_name!r} is not available here; use "cpu", or "cuda" '
                           'on a machine with an NVIDIA GPU and a CUDA build of torch')
     return Backend(torch_namespace, torch.device(device_name), dtype)
+
+
+def _backend_of(library: str, device_name: str, dtype: str) -> Backend:
+    """Return the back end of a copy: as `select_backend`, but torch may be on the CPU as well."""
+    if library == numpy_namespace.__name__ or device_name != 'cpu':
+        return select_backend(device_name, dtype)
+    import torch
+    return Backend(import_module(library), torch.device(device_name), dtype)
 
 
 def limit_threads(count: int) -> None:

@@ -35,5 +35,9 @@ class NotInitializedError(LMSCOError):
     """`update` was called before `initialize`."""
 
 
+class BusyError(LMSCOError):
+    """A tracker was called while another call, of a second thread, was at work in it."""
+
+
 class WeightsError(LMSCOError):
     """Weights of a network are missing, damaged, or those of another network."""

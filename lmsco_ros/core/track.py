@@ -24,9 +24,9 @@ from lmsco_ros.core.detection.detector import Detection, Detector
 from lmsco_ros.core.detection.scale import make_scale_estimator
 from lmsco_ros.core.extent.size import steady
 from lmsco_ros.core.fourier.localization import centered_map
-from lmsco_ros.core.imaging.frame import FrameView
 from lmsco_ros.core.imaging.gain import AutomaticGain
 from lmsco_ros.core.imaging.regions import check_box, clamp_box, visible_part
+from lmsco_ros.core.imaging.view import FrameView
 from lmsco_ros.core.presence.comparison import Comparison
 from lmsco_ros.core.presence.monitor import PresenceMonitor
 from lmsco_ros.core.presence.observer import Observer, Outlook, Sighting
@@ -66,7 +66,6 @@ class Track:
 
     def __init__(self, config: TrackerConfig, backend: Backend, networks: Networks,
                  image: np.ndarray, box: BoundingBox) -> None:
-        self.image_shape, self.image_type = image.shape, image.dtype
         check_box(box, (image.shape[1], image.shape[0]))
         self._config = config
         self._box, self._first_size = box, box.size

@@ -21,12 +21,17 @@ memory -> collaborative optimization -> filter.
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+import pickle
+from threading import Lock
+
 import numpy as np
 
 from lmsco_ros.core.backend import limit_threads, select_backend
 from lmsco_ros.core.config import TrackerConfig
-from lmsco_ros.core.errors import ImageError, NotInitializedError
-from lmsco_ros.core.imaging.frame import check_image
+from lmsco_ros.core.errors import BusyError, ConfigError, ImageError, NotInitializedError
+from lmsco_ros.core.imaging.frame import read_frame
 from lmsco_ros.core.track import Track
 from lmsco_ros.core.types import BoundingBox, TrackResult
 from lmsco_ros.core.weights.loading import load_networks
@@ -40,36 +45,58 @@ class LMSCOTracker:
 
     Parameters
     ----------
-    config : TrackerConfig
-        How to track; `TrackerConfig.preset('default')` unless given.
+    config : TrackerConfig or str
+        How to track, or the name of a preset; the preset 'default' unless given.
 
     Raises
     ------
     ConfigError
-        When the configured device is not available, or a network does not fit its blocks.
+        When there is no preset of that name, the configured device is not available, or a
+        network does not fit its blocks.
     WeightsError
         When the weights of a network are missing or damaged.
+    BusyError
+        From every method: when another thread is at work in this tracker. Nothing changes then.
 
     Notes
     -----
-    Images are (H, W) arrays of uint8, uint16 or float32, or (H, W, 3) of uint8 (BGR). They are
-    neither copied nor changed.
+    Images are (H, W) arrays of integers or floating-point numbers, or (H, W, 3) of uint8 (BGR);
+    `read_frame` says how they are read. They are not changed, and nothing of them is kept: the
+    next frame may come in the same memory.
+
+    `copy.deepcopy` and `pickle` take a tracker with its target: the copy goes on as the original
+    does. A pickle is read by the version of this package that has written it.
 
     """
 
-    def __init__(self, config: TrackerConfig | None = None) -> None:
-        self.config = config or TrackerConfig.preset('default')
+    def __init__(self, config: TrackerConfig | str | None = None) -> None:
+        self.config = _configuration(config)
         self._backend = select_backend(self.config.runtime.device)
         self._networks = load_networks(self.config)
         limit_threads(self.config.runtime.threads)
         self._track: Track | None = None
+        self._kind = ''
+        self._lock = Lock()
+
+    def __getstate__(self) -> bytes:
+        """Return everything but the lock, as it is between two calls."""
+        with self._alone():
+            state = {name: value for name, value in vars(self).items() if name != '_lock'}
+            return pickle.dumps(state, pickle.HIGHEST_PROTOCOL)
+
+    def __setstate__(self, state: bytes) -> None:
+        """Become the tracker whose state this is."""
+        vars(self).update(pickle.loads(state))
+        self._lock = Lock()
+        limit_threads(self.config.runtime.threads)
 
     @property
     def initialized(self) -> bool:
         """Whether there is a target to follow."""
         return self._track is not None
 
-    def initialize(self, image: np.ndarray, box: BoundingBox) -> TrackResult:
+    def initialize(self, image: np.ndarray,
+                   box: BoundingBox | Sequence[float] | np.ndarray) -> TrackResult:
         """
         Start to follow the target in `box`, in place of a former one.
 
@@ -77,13 +104,15 @@ class LMSCOTracker:
         ----------
         image : ndarray
             Frame that shows the target.
-        box : BoundingBox
-            The target in that frame.
+        box : BoundingBox, or four numbers
+            The target in that frame, (x, y, width, height) in pixels. It may reach over the
+            border, with a quarter of its area inside, but not be larger than the image.
 
         Returns
         -------
         TrackResult
-            The box itself, with the score map of the filter that was learned from it.
+            The part of the box in the image, with the score map of the filter that was learned
+            from it.
 
         Raises
         ------
@@ -91,9 +120,12 @@ class LMSCOTracker:
             When nothing can be learned from the box; a former target is kept.
 
         """
-        check_image(image)
-        self._track = Track(self.config, self._backend, self._networks, image, box)
-        return self._track.result
+        with self._alone():
+            frame = read_frame(image)
+            track = Track(self.config, self._backend, self._networks, frame.pixels,
+                          BoundingBox.of(box))
+            self._track, self._kind = track, frame.kind
+            return track.result
 
     def update(self, image: np.ndarray) -> TrackResult:
         """
@@ -112,15 +144,39 @@ class LMSCOTracker:
             When the frame does not fit the first one; the target is kept.
 
         """
-        if self._track is None:
-            raise NotInitializedError('there is no target; call initialize(image, box) first')
-        check_image(image)
-        if image.shape != self._track.image_shape or image.dtype != self._track.image_type:
-            raise ImageError(
-                f'the frame is {image.shape} {image.dtype}, but the target was initialized in '
-                f'{self._track.image_shape} {self._track.image_type}; initialize again')
-        return self._track.advance(image)
+        with self._alone():
+            if self._track is None:
+                raise NotInitializedError('there is no target; call initialize(image, box) first')
+            frame = read_frame(image)
+            if frame.kind != self._kind:
+                raise ImageError(f'the frame is {frame.kind}, but the target was initialized in '
+                                 f'{self._kind}; initialize again')
+            return self._track.advance(frame.pixels)
 
     def reset(self) -> None:
         """Forget the target."""
-        self._track = None
+        with self._alone():
+            self._track = None
+
+    @contextmanager
+    def _alone(self) -> Iterator[None]:
+        """Refuse what another call would get in the way of."""
+        if not self._lock.acquire(blocking=False):
+            raise BusyError('the tracker is at work on another call, of a second thread or of a '
+                            'signal handler; expected one call at a time: wait for it, or make '
+                            'a tracker for each thread. The target is kept')
+        try:
+            yield
+        finally:
+            self._lock.release()
+
+
+def _configuration(given: object) -> TrackerConfig:
+    """Return the configuration, or the preset of a name; that called default without one."""
+    if isinstance(given, TrackerConfig):
+        return given
+    if given is None or isinstance(given, str):
+        return TrackerConfig.preset('default' if given is None else given)
+    remedy = 'from_dict(...)' if isinstance(given, Mapping) else 'from_yaml(path)'
+    raise ConfigError(f'the configuration is a {type(given).__name__}; expected a TrackerConfig '
+                      f'or the name of a preset: give TrackerConfig.{remedy}')

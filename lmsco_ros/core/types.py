@@ -14,9 +14,13 @@
 
 """Plain values that enter and leave the tracker."""
 
+from __future__ import annotations
+
+from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import Enum
 import math
+import reprlib
 
 import numpy as np
 import numpy.typing as npt
@@ -39,7 +43,7 @@ class BoundingBox:
     Raises
     ------
     BoxError
-        When a number is not finite or a side is not positive.
+        When one is no number or not finite, or a side is not positive.
 
     """
 
@@ -50,7 +54,7 @@ class BoundingBox:
 
     def __post_init__(self) -> None:
         """Refuse boxes that enclose no area."""
-        if not all(math.isfinite(v) for v in (self.x, self.y, self.width, self.height)):
+        if not _finite(self.as_tuple()):
             raise BoxError(f'box {self.as_tuple()} has a number that is not finite; '
                            'give four finite numbers x, y, width, height in pixels')
         if self.width <= 0 or self.height <= 0:
@@ -58,8 +62,32 @@ class BoundingBox:
                            'width and height must be positive (in pixels)')
 
     @classmethod
+    def of(cls, box: BoundingBox | Sequence[float] | np.ndarray) -> BoundingBox:
+        """
+        Return a box that is given as such, or as four numbers.
+
+        Parameters
+        ----------
+        box : BoundingBox, or tuple, list or array of four numbers
+            (x, y, width, height) in pixels.
+
+        Raises
+        ------
+        BoxError
+            When it is anything else.
+
+        """
+        if isinstance(box, BoundingBox):
+            return box
+        numbers = box.tolist() if isinstance(box, np.ndarray) else box
+        if isinstance(numbers, (tuple, list)) and len(numbers) == 4 and _finite(numbers):
+            return cls(*map(float, numbers))
+        raise BoxError(f'box {reprlib.repr(box)} is a {type(box).__name__}; expected a '
+                       'BoundingBox, or (x, y, width, height): four finite numbers in pixels')
+
+    @classmethod
     def from_center(cls, center: tuple[float, float],
-                    size: tuple[float, float]) -> 'BoundingBox':
+                    size: tuple[float, float]) -> BoundingBox:
         """Return the box of `size` (width, height) around `center` (x, y)."""
         return cls(center[0] - size[0] / 2, center[1] - size[1] / 2, size[0], size[1])
 
@@ -82,24 +110,32 @@ class BoundingBox:
         """Return (x, y, width, height)."""
         return self.x, self.y, self.width, self.height
 
-    def moved_to(self, center: tuple[float, float]) -> 'BoundingBox':
+    def moved_to(self, center: tuple[float, float]) -> BoundingBox:
         """Return the box around another center (x, y)."""
         return BoundingBox.from_center(center, self.size)
 
-    def scaled(self, factor: float) -> 'BoundingBox':
+    def scaled(self, factor: float) -> BoundingBox:
         """Return the box enlarged by `factor` around its center."""
         return BoundingBox.from_center(self.center, (factor * self.width, factor * self.height))
 
-    def intersection(self, other: 'BoundingBox') -> float:
+    def intersection(self, other: BoundingBox) -> float:
         """Return the common area with `other` in square pixels."""
         width = min(self.x + self.width, other.x + other.width) - max(self.x, other.x)
         height = min(self.y + self.height, other.y + other.height) - max(self.y, other.y)
         return max(width, 0.0) * max(height, 0.0)
 
-    def overlap(self, other: 'BoundingBox') -> float:
+    def overlap(self, other: BoundingBox) -> float:
         """Return intersection over union with `other`, in [0, 1]."""
         common = self.intersection(other)
         return min(1.0, common / (self.area + other.area - common))
+
+
+def _finite(numbers: Sequence[float]) -> bool:
+    """Return whether these are finite numbers, all of them."""
+    try:
+        return all(math.isfinite(number) for number in numbers)
+    except (TypeError, OverflowError):
+        return False
 
 
 class TrackState(Enum):

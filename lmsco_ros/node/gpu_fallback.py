@@ -89,10 +89,13 @@ class FallbackTracker:
 
     def _resume(self, image: npt.NDArray) -> TrackResult:
         self._tracker.initialize(*self._found)
+        self._found = None
         return self._tracker.update(image)
 
     def _noted(self, image: npt.NDArray, result: TrackResult) -> TrackResult:
-        """Keep the newest frame that shows the target."""
-        if result.state is not TrackState.LOST:
-            self._found = image, result.box
+        """Keep the newest frame that shows the target, for as long as there is a way back."""
+        if self._device != 'cpu' and result.state is not TrackState.LOST:
+            # A copy, as the tracker keeps nothing of an image either: this one may be a part of
+            # a larger message, or be written over by the next frame.
+            self._found = image.copy(), result.box
         return result

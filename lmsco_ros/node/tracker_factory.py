@@ -65,5 +65,5 @@ def with_fallback(factory: Callable[[Settings], Tracker], settings: Settings,
         Called with the reason of a retreat.
 
     """
-    return FallbackTracker(lambda device: factory(replace(settings, device=device)),
-                           settings.device, warn)
+    device = settings.device or tracker_config(settings).runtime.device
+    return FallbackTracker(lambda device: factory(replace(settings, device=device)), device, warn)

@@ -187,7 +187,7 @@ def test_frames_of_another_kind_are_refused_and_the_target_is_kept(scene, tracke
 
 
 def test_unusable_images_are_refused(tracker):
-    for image in (np.zeros((20, 20)), np.zeros((4, 4), np.uint8), None):
+    for image in (np.zeros((20, 20), bool), np.zeros((4, 4), np.uint8), None):
         with pytest.raises(ImageError):
             tracker.initialize(image, box_of((10, 10), (5, 5)))
         assert not tracker.initialized
@@ -267,8 +267,10 @@ def test_refused_start_says_why_and_keeps_the_former_target(scene, tracker):
     tracker.initialize(scene.frame(CENTER), box_of())
     with pytest.raises(BoxError, match='smaller than'):
         tracker.initialize(scene.frame(CENTER), BoundingBox(5, 5, 1, 1))
-    with pytest.raises(BoxError, match='in the image'):
+    with pytest.raises(BoxError, match='has 0.0% of its area in the image of 160 x 128 pixels'):
         tracker.initialize(scene.frame(CENTER), BoundingBox(500, 5, 20, 20))
+    with pytest.raises(BoxError, match='larger than the image of 160 x 128 pixels; mark'):
+        tracker.initialize(scene.frame(CENTER), BoundingBox(50, 5, 20, 129))
     assert tracker.update(later(scene)).box.overlap(box_of()) > 0.9
 
 
@@ -304,10 +306,10 @@ def test_any_box_is_tracked_or_refused_for_a_reason(make_scene, x, y, w, h):
 
 @pytest.mark.parametrize('numbers', [
     (80, 60, 1, 1), (80, 60, 2, 2), (80, 60, 1, 40), (80, 60, 2, 120), (3, 60, 150, 2),
-    (0, 0, 160, 128), (-20, -20, 200, 168), (0, 0, 3, 3), (157, 125, 3, 3)])
+    (0, 0, 160, 128), (-20, -20, 200, 168), (-1, 0, 161, 60), (0, 0, 3, 3), (157, 125, 3, 3)])
 def test_odd_boxes_are_tracked_or_refused_for_a_reason(scene, numbers):
     accepted = track_or_refuse(scene, BoundingBox(*numbers))
-    assert accepted == (min(numbers[2:]) >= 2)
+    assert accepted == (min(numbers[2:]) >= 2 and numbers[2] <= 160 and numbers[3] <= 128)
 
 
 def track_or_refuse(scene, box):

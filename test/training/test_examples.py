@@ -19,8 +19,8 @@ import itertools
 import numpy as np
 import pytest
 
-from lmsco_ros.core.imaging.frame import FrameView
 from lmsco_ros.core.imaging.gain import IntensityRange
+from lmsco_ros.core.imaging.view import FrameView
 from lmsco_ros.core.types import BoundingBox
 from training import examples
 from training.degradations import degrade, occlude

@@ -100,9 +100,10 @@ class TrackerConfig:
         """Return a named configuration; `preset_names` lists them."""
         try:
             return cls(**PRESETS[name])
-        except KeyError:
+        except (KeyError, TypeError):
             raise ConfigError(f'unknown preset {name!r}; expected one of '
-                              f'{", ".join(PRESETS)}') from None
+                              f'{", ".join(PRESETS)}; TrackerConfig.from_yaml reads a file'
+                              ) from None
 
     @classmethod
     def preset_names(cls) -> tuple[str, ...]:

@@ -28,8 +28,8 @@ from lmsco_ros.core.features.extractor import FeatureExtractor
 from lmsco_ros.core.features.motion import MotionObserver
 from lmsco_ros.core.fourier.localization import locate, Peak, peak_to_sidelobe_ratio, refine
 from lmsco_ros.core.fourier.series import grid_size, shift
-from lmsco_ros.core.imaging.frame import FrameView
 from lmsco_ros.core.imaging.regions import patch_size, region_around
+from lmsco_ros.core.imaging.view import FrameView
 from lmsco_ros.core.learning.memory import score
 from lmsco_ros.core.learning.structured_operator import StructuredOperator
 from lmsco_ros.core.types import BoundingBox

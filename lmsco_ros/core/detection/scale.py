@@ -26,7 +26,7 @@ import scipy.fft
 from lmsco_ros.core.config import ScaleConfig
 from lmsco_ros.core.extent.size import credible_change
 from lmsco_ros.core.features.hog import hog
-from lmsco_ros.core.imaging.frame import FrameView
+from lmsco_ros.core.imaging.view import FrameView
 from lmsco_ros.core.types import BoundingBox
 
 __all__ = ['FixedScale', 'ScaleEstimator', 'ScaleFilter', 'ScaleSearch', 'make_scale_estimator',

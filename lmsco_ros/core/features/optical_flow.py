@@ -40,6 +40,10 @@ class DenseFlow:
         self._search = cv2.DISOpticalFlow_create(  # type: ignore[attr-defined]
             cv2.DISOPTICAL_FLOW_PRESET_ULTRAFAST)
 
+    def __reduce__(self) -> tuple[type[DenseFlow], tuple[()]]:
+        """Copy and pickle by making it anew: OpenCV's object cannot be, and holds nothing."""
+        return DenseFlow, ()
+
     def __call__(self, before: np.ndarray, after: np.ndarray) -> np.ndarray:
         """
         Return how far each pixel of `after` has come from `before`.

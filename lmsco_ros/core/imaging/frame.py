@@ -12,124 +12,110 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""A frame: what the tracker accepts, and its pixels in the working range."""
+"""A frame: what is accepted as one, and the pixels that the tracker works in."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-import math
 
-import cv2
 import numpy as np
 
 from lmsco_ros.core.errors import ImageError
-from lmsco_ros.core.imaging.gain import IntensityRange
-from lmsco_ros.core.imaging.pixels import measured, to_gray, without_dead_pixels
-from lmsco_ros.core.types import BoundingBox
 
-__all__ = ['check_image', 'FrameView']
+__all__ = ['Frame', 'read_frame']
 
 _SMALLEST_SIDE = 8
 
+_EXPECTED = '(H, W) of integers or floating-point numbers, or (H, W, 3) of uint8'
 
-def check_image(image: np.ndarray) -> None:
+
+@dataclass(frozen=True, eq=False)
+class Frame:
     """
-    Raise ImageError unless the tracker can work in the image.
-
-    Parameters
-    ----------
-    image : ndarray, shape (H, W) uint8, uint16 or float32, or (H, W, 3) uint8
-        Anything else is refused.
-
-    """
-    if not isinstance(image, np.ndarray):
-        raise ImageError(f'the image is a {type(image).__name__}; expected a NumPy array')
-    gray = image.ndim == 2 and image.dtype in (np.uint8, np.uint16, np.float32)
-    color = image.ndim == 3 and image.shape[2] == 3 and image.dtype == np.uint8
-    if not gray and not color:
-        raise ImageError(f'the image has shape {image.shape} and type {image.dtype}; expected '
-                         '(H, W) of uint8, uint16 or float32, or (H, W, 3) of uint8')
-    if min(image.shape[:2]) < _SMALLEST_SIDE:
-        raise ImageError(f'the image has {image.shape[1]} x {image.shape[0]} pixels; '
-                         f'expected at least {_SMALLEST_SIDE} in each direction')
-
-
-@dataclass(frozen=True)
-class FrameView:
-    """
-    One frame and the range its counts are seen in; pixels are converted only where sampled.
+    One image of the camera.
 
     Attributes
     ----------
-    image : ndarray, shape (H, W) or (H, W, 3)
-        The frame, not copied.
-    intensity : IntensityRange
-        Working range.
+    pixels : ndarray, shape (H, W) uint8, uint16 or float32, or (H, W, 3) uint8
+        In the byte order of the machine, aligned; the caller's own memory where it is so.
+    kind : str
+        Size and type as they were given: the same for all frames of a target.
 
     """
 
-    image: np.ndarray
-    intensity: IntensityRange
-
-    @property
-    def size(self) -> tuple[int, int]:
-        """Width and height in pixels."""
-        return self.image.shape[1], self.image.shape[0]
-
-    def copied(self) -> FrameView:
-        """Return a view that does not change when the caller's image does."""
-        return FrameView(self.image.copy(), self.intensity)
-
-    def patch(self, region: BoundingBox, size: tuple[int, int]) -> np.ndarray:
-        """
-        Resample a region of the frame.
-
-        Parameters
-        ----------
-        region : BoundingBox
-            In image pixels; the border pixels are repeated outside of the image.
-        size : tuple of int
-            Width and height of the patch.
-
-        Returns
-        -------
-        ndarray, shape (height, width), float32
-            Intensities in the working range. A region with more pixels than the patch is
-            averaged, not skipped through. Dead pixels are filled in first.
-
-        """
-        step = (region.width / size[0], region.height / size[1])
-        factor = (max(1, int(step[0])), max(1, int(step[1])))
-        x0, x1 = _covering_span(region.x, region.width, self.size[0], factor[0])
-        y0, y1 = _covering_span(region.y, region.height, self.size[1], factor[1])
-        pixels = without_dead_pixels(measured(to_gray(self.image[y0:y1, x0:x1])),
-                                     abs(self.intensity.high - self.intensity.low))
-        if factor != (1, 1):
-            pixels = _average(pixels, factor)
-        values = self.intensity.normalize(pixels.astype(np.float32, copy=False))
-        if self.image.dtype == np.float32:
-            values = np.nan_to_num(values, copy=False)
-        start = ((region.x + step[0] / 2 - x0) / factor[0] - 0.5,
-                 (region.y + step[1] / 2 - y0) / factor[1] - 0.5)
-        inverse = np.array([[step[0] / factor[0], 0, start[0]],
-                            [0, step[1] / factor[1], start[1]]])
-        return cv2.warpAffine(values, inverse, size, flags=cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP,
-                              borderMode=cv2.BORDER_REPLICATE)
+    pixels: np.ndarray
+    kind: str
 
 
-def _covering_span(start: float, length: float, limit: int, factor: int) -> tuple[int, int]:
-    """Return the pixel span inside the image that a resampled interval reads from."""
-    margin = 2 * factor
-    first = min(max(math.floor(start) - margin, 0), limit - 1)
-    last = min(max(math.ceil(start + length) + margin, first + 1), limit)
-    return first, last
+def read_frame(image: np.ndarray) -> Frame:
+    """
+    Return an image as the tracker works in it.
+
+    Parameters
+    ----------
+    image : ndarray, shape (H, W), (H, W, 1), or (H, W, 3) of uint8 (BGR)
+        Gray images hold any integers or floating-point numbers, in any memory layout and byte
+        order. All but uint8 and uint16 become float32: integers beyond 2**24 are rounded to
+        its 24 bits, and numbers beyond 1e12 count as pixels without a value, as NaN does. So do
+        the masked pixels of a masked array.
+
+    Raises
+    ------
+    ImageError
+        When it is no array, or one of another shape, type or size; says what to do.
+
+    """
+    if not isinstance(image, np.ndarray):
+        raise ImageError(f'the image is a {type(image).__name__}; expected a NumPy array: '
+                         f'{_way_to_array(image)}')
+    values = np.asarray(image)
+    if values.ndim == 3 and values.shape[2] == 1:
+        values, image = values[:, :, 0], image[:, :, 0]
+    _check(values)
+    kind = f'{values.shape} {values.dtype.name}'
+    if np.ma.is_masked(image):
+        return Frame(_without_masked(values, np.ma.getmaskarray(image)), kind)
+    keeps = values.dtype.name in ('uint8', 'uint16')
+    return Frame(_converted(values, values.dtype.name if keeps else 'float32'), kind)
 
 
-def _average(pixels: np.ndarray, factor: tuple[int, int]) -> np.ndarray:
-    """Return the means over cells of `factor` pixels; incomplete cells count as they are."""
-    height, width = pixels.shape
-    pad = (-height % factor[1], -width % factor[0])
-    if any(pad):
-        pixels = cv2.copyMakeBorder(pixels, 0, pad[0], 0, pad[1], cv2.BORDER_REPLICATE)
-    size = (pixels.shape[1] // factor[0], pixels.shape[0] // factor[1])
-    return cv2.resize(pixels, size, interpolation=cv2.INTER_AREA)
+def _way_to_array(image: object) -> str:
+    """Return how to make an array of something else."""
+    if image is None:
+        return 'see whether the frame could be read at all'
+    is_tensor = type(image).__module__.partition('.')[0] == 'torch'
+    return f'give {"image.cpu().numpy()" if is_tensor else "np.asarray(image)"}'
+
+
+def _check(values: np.ndarray) -> None:
+    """Raise ImageError unless the tracker can work in the values."""
+    if values.ndim == 2 and values.dtype.kind not in 'iuf' or values.ndim not in (2, 3):
+        remedy = 'give the counts or temperatures of one image, one number for each pixel'
+    elif values.ndim == 3 and values.shape[2] == 4:
+        remedy = 'leave the alpha channel out, image[:, :, :3], or give one channel'
+    elif values.ndim == 3 and (values.shape[2] != 3 or values.dtype != np.uint8):
+        remedy = 'give one channel, for instance image[:, :, 0]'
+    elif min(values.shape[:2]) < _SMALLEST_SIDE:
+        raise ImageError(f'the image has {values.shape[1]} x {values.shape[0]} pixels; '
+                         f'expected at least {_SMALLEST_SIDE} in each direction')
+    else:
+        return
+    raise ImageError(f'the image has shape {values.shape} and type {values.dtype}; '
+                     f'expected {_EXPECTED}: {remedy}')
+
+
+def _converted(values: np.ndarray, dtype: str) -> np.ndarray:
+    """Return values in another type; themselves where nothing has to be done."""
+    # What float32 cannot hold becomes infinite, which is a pixel without a value.
+    with np.errstate(over='ignore'):
+        values = values.astype(dtype, copy=False)
+    # OpenCV refuses rows that do not begin at a multiple of the size of their numbers.
+    return values if values.flags.aligned else values.copy()
+
+
+def _without_masked(values: np.ndarray, mask: np.ndarray) -> np.ndarray:
+    """Return gray values with NaN in place of the masked ones."""
+    if values.ndim == 3:
+        raise ImageError('the image is a masked array of colors, of which a part cannot be left '
+                         'out; give image.filled(), or one channel')
+    return np.where(mask, np.float32(np.nan), _converted(values, 'float32'))

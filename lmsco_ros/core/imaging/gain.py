@@ -118,7 +118,7 @@ class AutomaticGain:
         Parameters
         ----------
         image : ndarray
-            As `check_image` accepts it; pixels without a finite value do not count.
+            As `read_frame` returns it; pixels without a finite value do not count.
 
         Raises
         ------

@@ -98,7 +98,9 @@ def check_box(box: BoundingBox, image_size: tuple[int, int]) -> None:
     Parameters
     ----------
     box : BoundingBox
-        Target; may reach over the border of the image.
+        Target; may reach over the border of the image, by three quarters of its area at most.
+        What is wider or higher than the image is refused: that is a mistake in units or in the
+        image, or of a target of which only the visible part can be learned.
     image_size : tuple of int
         Width and height.
 
@@ -106,11 +108,14 @@ def check_box(box: BoundingBox, image_size: tuple[int, int]) -> None:
     if min(box.size) < _SMALLEST_TARGET:
         raise BoxError(f'box {box.as_tuple()} is smaller than {_SMALLEST_TARGET:g} pixels; '
                        'mark the target with some pixels in each direction')
-    image = BoundingBox(0, 0, *image_size)
-    if box.intersection(image) < _VISIBLE_PART * box.area:
-        raise BoxError(f'box {box.as_tuple()} has less than {_VISIBLE_PART:.0%} of its area in '
-                       f'the image of {image_size[0]} x {image_size[1]} pixels; '
-                       'mark the visible part of the target')
+    size = f'the image of {image_size[0]} x {image_size[1]} pixels'
+    if box.width > image_size[0] or box.height > image_size[1]:
+        raise BoxError(f'box {box.as_tuple()} is larger than {size}; mark the visible part of '
+                       'the target, as (x, y, width, height) in pixels of this image')
+    visible = box.intersection(BoundingBox(0, 0, *image_size))
+    if visible < _VISIBLE_PART * box.area:
+        raise BoxError(f'box {box.as_tuple()} has {visible / box.area:.1%} of its area in {size}, '
+                       f'less than {_VISIBLE_PART:.0%}; mark the visible part of the target')
 
 
 def clamp_box(box: BoundingBox, image_size: tuple[int, int]) -> BoundingBox:

@@ -44,11 +44,12 @@ def take_probe(image: np.ndarray) -> np.ndarray:
     Returns
     -------
     ndarray, shape (h, w)
-        Gray, contiguous, about 8000 pixels; all of them for smaller frames.
+        Gray, contiguous, about 8000 pixels; all of them for smaller frames. A copy: it is
+        compared with the next frame, for which the caller may use the same memory.
 
     """
     step = _step(image)
-    return measured(to_gray(np.ascontiguousarray(image[step // 2::step, step // 2::step])))
+    return measured(to_gray(image[step // 2::step, step // 2::step].copy()))
 
 
 def percentiles(values: np.ndarray, shares: tuple[float, ...]) -> list[float]:

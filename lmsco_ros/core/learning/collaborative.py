@@ -16,7 +16,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
+from functools import partial
 
 from lmsco_ros.core.backend import Array, array_namespace
 from lmsco_ros.core.fourier.series import half_weights, mean_of_squares, symmetrize
@@ -57,8 +58,9 @@ class CollaborativeOptimizer:
         self._windows = windows
         self._margin_weight = margin_weight
         self.filters = [0 * block[:, :, 0, :] for block in memory.blocks]
-        self._solver = ConjugateGradient(_inner_product(
-            self._flatten([_full_weights(block) for block in self.filters])))
+        weights = self._flatten([_full_weights(block) for block in self.filters])
+        # No function of its own: those cannot be copied and pickled with the tracker.
+        self._solver = ConjugateGradient(partial(_inner_product, weights))
 
     def optimize(self, outer: int, steps: int) -> None:
         """Run `outer` iterations with `steps` conjugate gradient steps each."""
@@ -123,11 +125,7 @@ def _full_weights(block: Array) -> Array:
     return xp.broadcast_to(half_weights(block)[None, :, None], block.shape)
 
 
-def _inner_product(weights: Array) -> Callable[[Array, Array], float]:
+def _inner_product(weights: Array, left: Array, right: Array) -> float:
     """Return the real inner product over whole spectra whose halves count with `weights`."""
     xp = array_namespace(weights)
-
-    def inner(left: Array, right: Array) -> float:
-        return float(xp.real(xp.vecdot(left, weights * right)))
-
-    return inner
+    return float(xp.real(xp.vecdot(left, weights * right)))

@@ -18,7 +18,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from lmsco_ros.core.imaging.frame import FrameView
+from lmsco_ros.core.imaging.view import FrameView
 from lmsco_ros.core.types import BoundingBox
 
 if TYPE_CHECKING:

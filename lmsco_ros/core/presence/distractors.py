@@ -20,7 +20,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 import math
 
-from lmsco_ros.core.imaging.frame import FrameView
+from lmsco_ros.core.imaging.view import FrameView
 from lmsco_ros.core.presence.evidence import JUMP
 from lmsco_ros.core.types import BoundingBox
 

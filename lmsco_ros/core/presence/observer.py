@@ -21,7 +21,7 @@ from dataclasses import dataclass
 import math
 
 from lmsco_ros.core.detection.detector import Detection, Detector
-from lmsco_ros.core.imaging.frame import FrameView
+from lmsco_ros.core.imaging.view import FrameView
 from lmsco_ros.core.presence.comparison import Comparison
 from lmsco_ros.core.presence.distractors import Distractors
 from lmsco_ros.core.presence.evidence import Assessment, Evidence

@@ -17,7 +17,7 @@
 from __future__ import annotations
 
 from lmsco_ros.core.config import SearchConfig
-from lmsco_ros.core.imaging.frame import FrameView
+from lmsco_ros.core.imaging.view import FrameView
 from lmsco_ros.core.presence.monitor import PresenceMonitor
 from lmsco_ros.core.presence.observer import Observer, Outlook, Sighting
 from lmsco_ros.core.search.salience import Salience

@@ -25,8 +25,8 @@ from lmsco_ros.core.config import IntensityConfig, ScaleConfig
 from lmsco_ros.core.detection.scale import (
     FixedScale, make_scale_estimator, scale_factors, ScaleFilter, ScaleSearch)
 from lmsco_ros.core.extent.size import credible_change, steady
-from lmsco_ros.core.imaging.frame import FrameView
 from lmsco_ros.core.imaging.gain import AutomaticGain
+from lmsco_ros.core.imaging.view import FrameView
 from lmsco_ros.core.types import BoundingBox
 
 CONFIG = ScaleConfig(estimator='filter', step=1.03, exponent_min=-8, exponent_max=8,

@@ -20,7 +20,6 @@ import pytest
 
 from lmsco_ros.core.config import IntensityConfig
 from lmsco_ros.core.errors import ImageError
-from lmsco_ros.core.imaging.frame import check_image
 from lmsco_ros.core.imaging.gain import AutomaticGain, IntensityRange
 from lmsco_ros.core.imaging.pixels import to_gray
 
@@ -136,29 +135,6 @@ def test_failed_frame_leaves_the_range():
     with pytest.raises(ImageError):
         gain.observe(np.full((60, 80), np.nan, np.float32))
     assert as_tuple(gain.observe(scene())) == pytest.approx(as_tuple(before))
-
-
-@pytest.mark.parametrize('dtype, shape', [
-    (np.uint8, (8, 8)), (np.uint16, (480, 640)), (np.float32, (9, 30)), (np.uint8, (20, 20, 3))])
-def test_supported_images(dtype, shape):
-    check_image(np.zeros(shape, dtype))
-
-
-@pytest.mark.parametrize('image, reason', [
-    ([[1, 2], [3, 4]], 'is a list; expected a NumPy array'),
-    (None, 'is a NoneType; expected a NumPy array'),
-    (np.zeros((20, 20), np.float64), 'type float64; expected'),
-    (np.zeros((20, 20), np.int32), 'type int32; expected'),
-    (np.zeros((20, 20), bool), 'type bool; expected'),
-    (np.zeros((20, 20, 4), np.uint8), r'shape \(20, 20, 4\)'),
-    (np.zeros((20, 20, 3), np.uint16), 'type uint16; expected'),
-    (np.zeros(20, np.uint8), r'shape \(20,\)'),
-    (np.zeros((0, 20), np.uint8), '20 x 0 pixels; expected at least'),
-    (np.zeros((7, 20), np.uint8), '20 x 7 pixels; expected at least'),
-])
-def test_unsupported_images_are_refused_for_a_reason(image, reason):
-    with pytest.raises(ImageError, match=reason):
-        check_image(image)
 
 
 def test_gray_passes_through_and_color_is_weighted():

@@ -18,8 +18,8 @@ import numpy as np
 import pytest
 
 from lmsco_ros.core import BoundingBox
-from lmsco_ros.core.imaging.frame import FrameView
 from lmsco_ros.core.imaging.gain import IntensityRange
+from lmsco_ros.core.imaging.view import FrameView
 from lmsco_ros.core.presence.comparison import Comparison
 from lmsco_ros.core.weights.store import load_backbone
 

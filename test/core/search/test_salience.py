@@ -18,8 +18,8 @@ from hypothesis import given, settings, strategies as st
 import numpy as np
 import pytest
 
-from lmsco_ros.core.imaging.frame import FrameView
 from lmsco_ros.core.imaging.gain import IntensityRange
+from lmsco_ros.core.imaging.view import FrameView
 from lmsco_ros.core.search.salience import Salience
 from lmsco_ros.core.types import BoundingBox
 
