@@ -41,15 +41,15 @@ from benchmarks.scenes import Clip, recorded_clips, walking_scene
 from lmsco_ros.core import LMSCOTracker, TrackerConfig
 from lmsco_ros.core.backend import Array, Backend
 from lmsco_ros.core.config import LearningConfig
-from lmsco_ros.core.detection.detector import detector
+from lmsco_ros.core.detection import detector
 from lmsco_ros.core.learning.structured_operator import StructuredOperator
 from lmsco_ros.evaluation.report.style import looks, style_axes
 from lmsco_ros.evaluation.session import Request
 
 LOSSES: dict[str, dict[str, Any]] = {
-    'unit anchor': {'anchor': 'unit'},
-    'coupled anchor': {'anchor': 'coupled'},
-    'ridge': {'anchor': 'unit', 'core': 0.0},
+    'unit anchor': {'loss': 'unit'},
+    'coupled anchor': {'loss': 'coupled'},
+    'ridge': {'loss': 'ridge'},
 }
 CONVERGED = {'iterations': 30, 'gradient_steps': 2, 'update_interval': 1}
 PAPER = {'iterations': 3, 'gradient_steps': 2, 'update_interval': 5}

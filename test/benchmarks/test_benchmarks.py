@@ -164,7 +164,7 @@ def test_side_by_side_leaves_out_who_is_not_there(capsys):
 
 def test_side_by_side_takes_configuration_files(tmp_path, capsys):
     """A YAML file is a tracker like any other; a broken one is left out with the reason."""
-    (tmp_path / 'good.yaml').write_text('preset: default\nnewton_steps: 0\n')
+    (tmp_path / 'good.yaml').write_text('preset: default\nsampling: {newton_steps: 0}\n')
     (tmp_path / 'bad.yaml').write_text('newton: 0\n')
     side_by_side.main(['--frames', '4', '--tracker', str(tmp_path / 'good.yaml'),
                        '--tracker', str(tmp_path / 'bad.yaml')])
@@ -211,7 +211,7 @@ def test_paper_cost_compares_with_the_bare_networks(capsys):
 
 
 @pytest.mark.parametrize('name, changes', [
-    ('ridge', {'core': 0}), ('coupled', {'anchor': 'coupled'})])
+    ('ridge', {'loss': 'ridge'}), ('coupled', {'loss': 'coupled'})])
 def test_configurations_of_losses_change_the_loss_alone(name, changes):
     """Whatever else differs would be compared with it."""
     default = TrackerConfig.preset('default')

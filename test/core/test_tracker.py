@@ -337,11 +337,10 @@ def test_default_configuration_needs_no_argument(scene):
 
 
 @pytest.mark.parametrize('learning', [
-    LearningConfig(anchor='coupled', initial_iterations=20),
-    LearningConfig(solve='per_block', initial_iterations=10),
-    LearningConfig(core=0.0, initial_iterations=10),
+    LearningConfig(loss='coupled', initial_iterations=20),
+    LearningConfig(loss='ridge', initial_iterations=10),
     LearningConfig(memory_size=1, initial_iterations=10)],
-    ids=['coupled', 'per_block', 'ridge', 'one_sample'])
+    ids=['coupled', 'ridge', 'one_sample'])
 def test_every_way_of_learning_tracks(scene, learning):
     config = TrackerConfig(
         features=(FeatureConfig((ChannelConfig('hog'),), 4),

@@ -141,7 +141,7 @@ def test_identity_follows_settings_and_code(monkeypatch, config_file):
     same = resolve(config_file('preset: hcs\nscale: {estimator: search}\n'))
     assert same.identity == resolve('hcs').identity
     others = [resolve(config_file(f'preset: hcs\n{text}\n')) for text in (
-        'newton_steps: 4', 'motion: {least_motion: 0.4}', 'runtime: {threads: 2}')]
+        'sampling: {newton_steps: 4}', 'motion: {least_motion: 0.4}', 'runtime: {threads: 2}')]
     others += [resolve('mil'), resolve('default')]
     assert len({spec.identity for spec in (same, *others)}) == 6
     before = same.identity
@@ -165,7 +165,7 @@ def test_missing_configuration_is_named():
 
 
 def test_two_trackers_of_one_name_are_refused(config_file):
-    name = config_file('preset: hcs\nnewton_steps: 1', 'hcs.yaml')
+    name = config_file('preset: hcs\nsampling: {newton_steps: 1}', 'hcs.yaml')
     assert [spec.name for spec in build_trackers([name, name])] == ['hcs']
     with pytest.raises(TrackerError, match="2 trackers are called 'hcs'.*rename the file"):
         build_trackers(['hcs', name])

@@ -15,6 +15,8 @@
 
 """A GPU without memory costs speed, and nothing else."""
 
+import weakref
+
 from diagnostic_msgs.msg import DiagnosticArray
 import numpy as np
 import pytest
@@ -58,6 +60,29 @@ def test_goes_on_from_the_last_frame_that_showed_the_target(bench):
     assert 'processor' in warning and '2 GiB are missing' in warning
     tracker.initialize(image(4), BOX)
     assert calls(fakes['cpu'])[-1] == ('initialize', 4)
+
+
+def test_one_buffer_for_all_frames_is_as_good_as_fresh_ones(bench):
+    tracker, fakes, _ = bench
+    buffer = image(0)
+    tracker.initialize(buffer, BOX)
+    buffer[...] = 1
+    tracker.update(buffer)
+    fakes['cuda'].error = OutOfMemory()
+    buffer[...] = 2
+    tracker.update(buffer)
+    assert calls(fakes['cpu']) == [('initialize', 1), ('update', 2)]
+
+
+@pytest.mark.parametrize('device', ['cuda', 'cpu'])
+def test_nothing_of_a_frame_is_kept(make_fake, device):
+    tracker = FallbackTracker(lambda device: make_fake(), device, lambda reason: None)
+    for call in (lambda image: tracker.initialize(image, BOX), tracker.update):
+        frame = image(0)
+        kept = weakref.ref(frame)
+        call(frame)
+        del frame
+        assert kept() is None
 
 
 def test_start_is_repeated_on_the_processor(bench):

@@ -172,7 +172,7 @@ def test_filter_is_about_that_of_the_tracker(rng):
     half_a_cell = np.exp(-1j * np.pi * np.arange(-order, order + 1) / cells)
     sample = analyze(np.moveaxis(slow_maps(maps[0, 0]), 0, -1))
     sample = sample * (half_a_cell[:, None] * half_a_cell[None, order:])[:, :, None]
-    learning = LearningConfig(core=0.0, label_sigma=0.6 / cells * 5, window_minimum=0.005,
+    learning = LearningConfig(loss='ridge', label_sigma=0.6 / cells * 5, window_minimum=0.005,
                               window_edge=0.01, window_sparsity=0.0, initial_iterations=100,
                               gradient_steps=5)
     operator = StructuredOperator(learning, [sample], (0.2, 0.2),

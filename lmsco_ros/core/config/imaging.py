@@ -55,7 +55,7 @@ class IntensityConfig:
 @dataclass(frozen=True)
 class SamplingConfig:
     """
-    The search region and its patch.
+    The search region, its patch, and how exactly the peak is found in it.
 
     Attributes
     ----------
@@ -64,15 +64,19 @@ class SamplingConfig:
     patch_size_min, patch_size_max : int
         Limits of the side of the patch, in pixels, into which the search region is resampled;
         the nearest size that fits the cells and the Fourier transform is taken.
+    newton_steps : int
+        Refinement of the score's maximum between the points of its grid.
 
     """
 
     search_factor: float = 5.0
     patch_size_min: int = 140
     patch_size_max: int = 140
+    newton_steps: int = 5
 
     def __post_init__(self) -> None:
         """Check the ranges."""
         check_range(self, 'search_factor', 1.5, 10)
         check_range(self, 'patch_size_min', 32, 1024)
         check_range(self, 'patch_size_max', self.patch_size_min, 1024)
+        check_range(self, 'newton_steps', 0, 100)

@@ -30,12 +30,9 @@ class LearningConfig:
 
     Attributes
     ----------
-    anchor : {'unit', 'coupled', 'frozen'}
-        Reading of s(y0) in the margin; `frozen` is the literal (11)-(12) and diverges.
-    solve : {'joint', 'per_block'}
-        One problem for all blocks, or one for each.
-    core : float
-        Label above which the unit anchor's loss is two-sided; 0 is ridge regression.
+    loss : {'unit', 'coupled', 'ridge'}
+        The margin of the paper's (7), with s(y0) held at its desired value 1 or moving with the
+        filter, or ridge regression.
     margin_weight : float
         C of the paper's (7).
     label_sigma : float
@@ -59,9 +56,7 @@ class LearningConfig:
 
     """
 
-    anchor: str = 'unit'
-    solve: str = 'joint'
-    core: float = 0.5
+    loss: str = 'unit'
     margin_weight: float = 1.0
     label_sigma: float = 1 / 12
     window_minimum: float = 0.02
@@ -76,9 +71,7 @@ class LearningConfig:
 
     def __post_init__(self) -> None:
         """Check the ranges."""
-        check_choice(self, 'anchor', ('unit', 'coupled', 'frozen'))
-        check_choice(self, 'solve', ('joint', 'per_block'))
-        check_range(self, 'core', 0, 1)
+        check_choice(self, 'loss', ('unit', 'coupled', 'ridge'))
         check_range(self, 'margin_weight', 0, 1e6, open_low=True)
         check_range(self, 'label_sigma', 0, 1, open_low=True)
         check_range(self, 'window_minimum', 0, 1e3, open_low=True)

@@ -32,7 +32,7 @@ from lmsco_ros.core.config.presence import ComparisonConfig, PresenceConfig
 from lmsco_ros.core.config.presets import HANDCRAFTED, PRESETS
 from lmsco_ros.core.config.runtime import RuntimeConfig
 from lmsco_ros.core.config.search import SearchConfig
-from lmsco_ros.core.config.validation import build, check_range
+from lmsco_ros.core.config.validation import build
 from lmsco_ros.core.errors import ConfigError
 
 __all__ = ['TrackerConfig']
@@ -51,8 +51,6 @@ class TrackerConfig:
         Feature blocks.
     intensity, sampling, networks, motion, learning, scale, comparison, presence, search, runtime
         Sections, described in their classes.
-    newton_steps : int
-        Refinement of the score's maximum.
 
     Raises
     ------
@@ -72,11 +70,9 @@ class TrackerConfig:
     presence: PresenceConfig = PresenceConfig()
     search: SearchConfig = SearchConfig()
     runtime: RuntimeConfig = RuntimeConfig()
-    newton_steps: int = 5
 
     def __post_init__(self) -> None:
         """Check the ranges."""
-        check_range(self, 'newton_steps', 0, 100)
         if not self.features:
             raise ConfigError('TrackerConfig.features is empty; name at least one block, '
                               'for instance {channels: [{kind: hog}]}')

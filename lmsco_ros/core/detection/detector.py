@@ -137,7 +137,7 @@ class Detector:
         samples = self._extractor(patches, self._moving(regions, patches, factors))
         scores = self._operator.scores(samples)
         grid = grid_size(int(scores.shape[1]) - 1)
-        peak = locate(scores, grid, self._config.newton_steps)
+        peak = locate(scores, grid, self._config.sampling.newton_steps)
         best = peak.scale_index
         sharpness = peak_to_sidelobe_ratio(
             peak.grid, round(grid / (2 * self._config.sampling.search_factor)))
@@ -172,7 +172,7 @@ class Detector:
         row, column = np.unravel_index(np.argmax(square), square.shape)
         start = tuple((t / size + 0.5) % 1.0 - 0.5 for t in (rows[row], columns[column]))
         displacement, value = refine(to_numpy(detection.scores), (start[0], start[1]),
-                                     self._config.newton_steps)
+                                     self._config.sampling.newton_steps)
         peak = replace(detection.peak, displacement=displacement, value=value)
         return replace(detection, peak=peak,
                        sharpness=detection.sharpness * value / detection.peak.value)

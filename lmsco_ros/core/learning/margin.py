@@ -15,15 +15,15 @@
 """
 The margin loss on a grid of shifts: objective, slack step, and the operator M.
 
-Three readings of the anchor s(y0) in the margin constraint of the paper, (7)-(12), share one
+Two readings of the anchor s(y0) in the margin constraint of the paper, (7)-(12), share one
 interface. In each outer iteration `slack_targets` solves for the slack (9), and the filter then
 fits  M S = q  in the least squares sense (10); `normal` is M^H M and the targets are M^H q.
 
     unit     s(y0) has its desired value m(y0) = 1:  M S = s, q = m - eps, a one-sided loss,
-             two-sided on the core {m >= core}
+             two-sided on the core {m >= 1/2}; with all shifts in the core it is ridge regression
     coupled  s(y0) moves with the filter:            M S = s(0) - s, q = max(l, s(0) - s)
-    frozen   s(y0) is that of the last filter:       M S = s, q = s(0) - max(l, s(0) - s);
-             the literal (11)-(12), kept because it is not monotone
+
+The literal (11)-(12), in which s(y0) is that of the last filter, is not monotone and not offered.
 """
 
 from __future__ import annotations
@@ -35,8 +35,10 @@ import numpy as np
 from lmsco_ros.core.backend import Array, array_namespace, Backend
 from lmsco_ros.core.fourier.series import analyze, synthesize, value_at_origin
 
-__all__ = ['CoupledAnchor', 'FrozenAnchor', 'MarginLoss', 'UnitAnchor', 'gaussian_label',
-           'make_margin_loss']
+__all__ = ['CoupledAnchor', 'MarginLoss', 'UnitAnchor', 'gaussian_label', 'make_margin_loss']
+
+# Label from which the loss of the unit anchor is two-sided: half of the peak.
+_CORE = 0.5
 
 
 def gaussian_label(size: int, sigma: tuple[float, float]) -> np.ndarray:
@@ -98,7 +100,7 @@ class UnitAnchor:
     label : array, shape (N, N)
         Desired score m on the grid of shifts.
     core : float
-        The loss is two-sided where m >= core; 0 gives ridge regression.
+        The loss is two-sided where m >= core; -inf gives ridge regression.
 
     """
 
@@ -176,61 +178,26 @@ class CoupledAnchor:
         return array_namespace(differences).maximum(differences, self._margin)
 
 
-class FrozenAnchor:
-    """
-    Anchor at the score of the last filter: (11)-(12) to the letter.
-
-    Parameters
-    ----------
-    label : array, shape (N, N)
-        Desired score m on the grid of shifts.
-
-    """
-
-    couples_frequencies = False
-
-    def __init__(self, label: Array) -> None:
-        self._coupled = CoupledAnchor(label)
-        self._size = int(label.shape[0])
-        self._margin = 1 - label[:, :, None]
-
-    def normal(self, scores: Array) -> Array:
-        """Return S: M is the identity."""
-        return scores
-
-    def slack_targets(self, scores: Array) -> Array:
-        """Return the series of rho = s(0) - l - eps at these scores."""
-        values = synthesize(scores, self._size)
-        origin = values[:1, :1, :]
-        return analyze(origin - array_namespace(values).maximum(origin - values, self._margin))
-
-    def losses(self, scores: Array) -> Array:
-        """Return the losses of the coupled problem, which this anchor means to solve."""
-        return self._coupled.losses(scores)
-
-
 def _mean_of_squares(values: Array) -> Array:
     """Return the mean over the grid, per sample."""
     return array_namespace(values).mean(values**2, axis=(0, 1))
 
 
-def make_margin_loss(anchor: str, label: np.ndarray, core: float, backend: Backend) -> MarginLoss:
+def make_margin_loss(loss: str, label: np.ndarray, backend: Backend) -> MarginLoss:
     """
-    Return the loss with the named anchor.
+    Return the loss of a name.
 
     Parameters
     ----------
-    anchor : {'unit', 'coupled', 'frozen'}
-        Reading of s(y0).
+    loss : {'unit', 'coupled', 'ridge'}
+        The margin by a reading of s(y0), or ridge regression.
     label : ndarray, shape (N, N)
         Desired score on the grid of shifts.
-    core : float
-        Core of the unit anchor.
     backend : Backend
         Where the scores live.
 
     """
     values = backend.asarray(label)
-    if anchor == 'unit':
-        return UnitAnchor(values, core)
-    return CoupledAnchor(values) if anchor == 'coupled' else FrozenAnchor(values)
+    if loss == 'coupled':
+        return CoupledAnchor(values)
+    return UnitAnchor(values, _CORE if loss == 'unit' else -np.inf)

@@ -31,7 +31,7 @@ __all__ = ['StructuredOperator']
 
 class StructuredOperator:
     """
-    Filters of all blocks, trained together or block by block.
+    Filters of all blocks, trained together.
 
     Parameters
     ----------
@@ -49,21 +49,23 @@ class StructuredOperator:
     def __init__(self, config: LearningConfig, sample: Sequence[Array],
                  target: tuple[float, float], backend: Backend) -> None:
         self._config = config
-        everything = range(len(sample))
-        self._groups = [tuple(everything)] if config.solve == 'joint' else [
-            (block,) for block in everything]
-        self._memories = []
-        self._optimizers = []
-        for group in self._groups:
-            memory, optimizer = _make_group(config, [sample[i] for i in group], target, backend)
-            self._memories.append(memory)
-            self._optimizers.append(optimizer)
-        self._optimize(config.initial_iterations)
+        self._memory = SampleMemory(config.memory_size, config.learning_rate,
+                                    [block.shape for block in sample], backend)
+        self._memory.add(sample)
+        side = (target[0] * target[1])**0.5
+        label = gaussian_label(grid_size(self._memory.order), (config.label_sigma * side,) * 2)
+        series = window_series(target, config.window_minimum, config.window_edge,
+                               config.window_sparsity)
+        self._optimizer = CollaborativeOptimizer(
+            self._memory, make_margin_loss(config.loss, label, backend),
+            [SpatialWindow(series, bandwidth(block), backend) for block in sample],
+            config.margin_weight)
+        self._optimizer.optimize(config.initial_iterations, config.gradient_steps)
 
     @property
     def filters(self) -> list[Array]:
         """Filter coefficients of every block, shape (2K_l + 1, K_l + 1, C_l)."""
-        return [block for optimizer in self._optimizers for block in optimizer.filters]
+        return self._optimizer.filters
 
     def scores(self, samples: Sequence[Array]) -> Array:
         """
@@ -84,33 +86,12 @@ class StructuredOperator:
 
     def remember(self, sample: Sequence[Array]) -> None:
         """Add a training sample, the target at the origin."""
-        for group, memory in zip(self._groups, self._memories, strict=True):
-            memory.add([sample[i] for i in group])
+        self._memory.add(sample)
 
     def train(self) -> None:
         """Adapt the filters to the samples in memory."""
-        self._optimize(self._config.iterations)
+        self._optimizer.optimize(self._config.iterations, self._config.gradient_steps)
 
     def objective(self) -> float:
         """Return the objective of the training problem at the current filters."""
-        return sum(optimizer.objective() for optimizer in self._optimizers)
-
-    def _optimize(self, iterations: int) -> None:
-        """Run the collaborative optimization of every group."""
-        for optimizer in self._optimizers:
-            optimizer.optimize(iterations, self._config.gradient_steps)
-
-
-def _make_group(config: LearningConfig, sample: Sequence[Array], target: tuple[float, float],
-                backend: Backend) -> tuple[SampleMemory, CollaborativeOptimizer]:
-    """Return memory and optimizer of blocks that are trained together."""
-    memory = SampleMemory(config.memory_size, config.learning_rate,
-                          [block.shape for block in sample], backend)
-    memory.add(sample)
-    side = (target[0] * target[1])**0.5
-    label = gaussian_label(grid_size(memory.order), (config.label_sigma * side,) * 2)
-    loss = make_margin_loss(config.anchor, label, config.core, backend)
-    series = window_series(target, config.window_minimum, config.window_edge,
-                           config.window_sparsity)
-    windows = [SpatialWindow(series, bandwidth(block), backend) for block in sample]
-    return memory, CollaborativeOptimizer(memory, loss, windows, config.margin_weight)
+        return self._optimizer.objective()

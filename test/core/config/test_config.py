@@ -40,12 +40,11 @@ configs = st.builds(
                         high_percentile=st.floats(51, 100), jump=st.floats(0, 1)),
     sampling=st.builds(SamplingConfig, search_factor=st.floats(1.5, 10),
                        patch_size_min=st.integers(64, 200),
-                       patch_size_max=st.integers(200, 1024)),
+                       patch_size_max=st.integers(200, 1024), newton_steps=st.integers(0, 100)),
     networks=st.builds(NetworkConfig, words, words, words | st.just('')),
     motion=st.builds(MotionConfig, st.booleans(), st.floats(0, 100)),
     comparison=st.builds(ComparisonConfig, words | st.just('')),
-    learning=st.builds(LearningConfig, anchor=st.sampled_from(['unit', 'coupled', 'frozen']),
-                       solve=st.sampled_from(['joint', 'per_block']), core=st.floats(0, 1),
+    learning=st.builds(LearningConfig, loss=st.sampled_from(['unit', 'coupled', 'ridge']),
                        window_minimum=st.floats(1e-6, 1), window_edge=st.floats(1, 1e3),
                        memory_size=st.integers(1, 1000)),
     scale=st.builds(ScaleConfig, estimator=st.sampled_from(['filter', 'search', 'none']),
@@ -57,8 +56,7 @@ configs = st.builds(
                        learn=st.sampled_from(['tracking', 'always'])),
     search=st.builds(SearchConfig, st.integers(0, 64), st.integers(0, 64)),
     runtime=st.builds(RuntimeConfig, device=st.sampled_from(['cpu', 'cuda', 'cuda:1']),
-                      threads=st.integers(1, 256)),
-    newton_steps=st.integers(0, 100))
+                      threads=st.integers(1, 256)))
 
 
 @given(config=configs)
@@ -72,7 +70,8 @@ def test_plain_values_survive_yaml(config):
 
 
 def test_file_round_trip(tmp_path):
-    config = replace(TrackerConfig(), newton_steps=3, scale=ScaleConfig(step=1.07),
+    config = replace(TrackerConfig(), sampling=SamplingConfig(newton_steps=3),
+                     scale=ScaleConfig(step=1.07),
                      features=(FeatureConfig((ChannelConfig('intensity', 0.5),), 8),
                                FeatureConfig((ChannelConfig('hog'),), 4)))
     config.to_yaml(tmp_path / 'c.yaml')
@@ -117,8 +116,9 @@ def test_presets_of_the_ablation_are_one_factor_apart():
 def test_partial_configuration_changes_only_what_it_names():
     base = TrackerConfig.preset('hcs')
     changed = TrackerConfig.from_dict(
-        {'preset': 'hcs', 'learning': {'memory_size': 7}, 'newton_steps': 2})
-    assert changed == replace(base, newton_steps=2, learning=replace(base.learning, memory_size=7))
+        {'preset': 'hcs', 'learning': {'memory_size': 7}, 'search': {'tiles': 3}})
+    assert changed == replace(base, search=replace(base.search, tiles=3),
+                              learning=replace(base.learning, memory_size=7))
 
 
 def test_list_replaces_the_whole_list():
@@ -156,7 +156,7 @@ def test_given_mapping_is_left_alone():
      r'features\[0\].channels\[0\].layr', 'layer'),
     ({'networks': {'motion_backbon': 'x'}}, 'networks.motion_backbon', 'motion_backbone'),
     ({'motion': {'least_motoin': 1}}, 'motion.least_motoin', 'least_motion'),
-    ({'newton_step': 3}, 'newton_step', 'newton_steps'),
+    ({'sampling': {'newton_step': 3}}, 'sampling.newton_step', 'newton_steps'),
     ({7: 3}, '7', ''),
 ])
 def test_unknown_key_names_the_nearest(data, path, nearest):
@@ -180,9 +180,9 @@ def test_misspelled_key_is_found_again(config, section, position, letter):
     ({'learning': {'memory_size': 2.5}}, 'learning.memory_size is 2.5; expected an? int'),
     ({'learning': {'memory_size': '5'}}, "learning.memory_size is '5'; expected a int"),
     ({'learning': {'memory_size': True}}, 'learning.memory_size is True; expected an? int'),
-    ({'learning': {'core': None}}, 'learning.core is None; expected a float'),
-    ({'learning': {'core': False}}, 'learning.core is False; expected a float'),
-    ({'learning': {'anchor': 3}}, 'learning.anchor is 3; expected a str'),
+    ({'learning': {'margin_weight': None}}, 'learning.margin_weight is None; expected a float'),
+    ({'learning': {'margin_weight': False}}, 'learning.margin_weight is False; expected a float'),
+    ({'learning': {'loss': 3}}, 'learning.loss is 3; expected a str'),
     ({'learning': 3}, 'learning is 3; expected keys and values'),
     ({'scale': {'step': [1.1]}}, r'scale.step is \[1.1\]; expected a float'),
     ({'features': 'hog'}, "features is 'hog'; expected a list"),
@@ -205,7 +205,7 @@ BOUNDS = [
     (IntensityConfig, 'smoothing', 0, 1.1), (IntensityConfig, 'jump', -0.1, 1.1),
     (SamplingConfig, 'search_factor', 1.4, 10.5), (SamplingConfig, 'patch_size_min', 31, 1025),
     (SamplingConfig, 'patch_size_max', 31, 1025),
-    (LearningConfig, 'core', -0.1, 1.1), (LearningConfig, 'margin_weight', 0, 2e6),
+    (LearningConfig, 'margin_weight', 0, 2e6),
     (LearningConfig, 'label_sigma', 0, 1.1), (LearningConfig, 'window_minimum', 0, 1001),
     (LearningConfig, 'window_edge', 0, 1001), (LearningConfig, 'window_sparsity', -0.1, 1.1),
     (LearningConfig, 'memory_size', 0, 1001), (LearningConfig, 'learning_rate', -0.1, 0.6),
@@ -222,7 +222,7 @@ BOUNDS = [
     (PresenceConfig, 'reference_frames', 0, 1001), (PresenceConfig, 'lost_frames', 0, 1001),
     (SearchConfig, 'candidates', -1, 65), (SearchConfig, 'tiles', -1, 65),
     (RuntimeConfig, 'threads', 0, 257),
-    (TrackerConfig, 'newton_steps', -1, 101),
+    (SamplingConfig, 'newton_steps', -1, 101),
 ]
 
 
@@ -262,8 +262,7 @@ def test_values_that_do_not_go_together_are_refused(values, words):
 
 
 @pytest.mark.parametrize('section, name, choices', [
-    ('learning', 'anchor', 'unit, coupled, frozen'),
-    ('learning', 'solve', 'joint, per_block'),
+    ('learning', 'loss', 'unit, coupled, ridge'),
     ('scale', 'estimator', 'filter, search, none'),
 ])
 def test_choices_are_listed(section, name, choices):
@@ -293,7 +292,7 @@ def test_features_are_checked(block, reason):
     ('- 1\n- 2\n', 'holds list; expected keys and values'),
     ('a: [1,\n', '(?s)cannot read the configuration .*expected a readable YAML file'),
     ('just words\n', 'holds str; expected keys and values'),
-    ('learning: {anchor: best}\n', "anchor is 'best'; expected one of"),
+    ('learning: {loss: best}\n', "loss is 'best'; expected one of"),
 ])
 def test_broken_files_are_named(tmp_path, text, reason):
     (tmp_path / 'broken.yaml').write_text(text)

@@ -21,7 +21,9 @@ from lmsco_ros.core.fourier.series import analyze, inner, synthesize
 from lmsco_ros.core.learning.margin import gaussian_label, make_margin_loss
 
 SIZE = 9
-ANCHORS = ('unit', 'coupled', 'frozen')
+LOSSES = ('unit', 'coupled', 'ridge')
+# Label from which the loss is two-sided.
+CORE = {'unit': 0.5, 'ridge': -np.inf}
 
 
 @pytest.fixture
@@ -35,25 +37,25 @@ def scores(rng, label):
     return analyze(label[:, :, None] + 0.5 * rng.normal(size=(SIZE, SIZE, 4)))
 
 
-def margin_matrix(anchor):
+def margin_matrix(name):
     """Return M on the flattened grid: s(0) - s, or s itself."""
     identity = np.eye(SIZE**2)
-    if anchor != 'coupled':
+    if name != 'coupled':
         return identity
     origin = np.zeros_like(identity)
     origin[:, 0] = 1
     return origin - identity
 
 
-def targets(anchor, values, label, core=0.5):
+def targets(name, values, label):
     """Return q on the flattened grid after the slack step, sample by sample."""
     m, s = label.reshape(-1, 1), values.reshape(SIZE**2, -1)
-    if anchor == 'unit':
-        slack = np.where(m >= core, 0.0, np.maximum(0, m - s))
+    if name in CORE:
+        slack = np.where(m >= CORE[name], 0.0, np.maximum(0, m - s))
         return m - slack
     loss, difference = 1 - m, s[:1] - s
     slack = np.maximum(0, difference - loss)
-    return loss + slack if anchor == 'coupled' else s[:1] - loss - slack
+    return loss + slack
 
 
 def test_label_is_a_periodic_gaussian():
@@ -70,18 +72,18 @@ def test_label_falls_off_as_its_sigma_says():
     assert label[0, 51 - 5] == pytest.approx(np.exp(-0.5 * (5 / 51 / 0.1)**2), abs=1e-6)
 
 
-@pytest.mark.parametrize('anchor', ANCHORS)
-def test_normal_operator_is_that_of_the_matrix(backend, label, scores, anchor):
-    loss = make_margin_loss(anchor, label, 0.5, backend)
-    matrix = margin_matrix(anchor)
+@pytest.mark.parametrize('name', LOSSES)
+def test_normal_operator_is_that_of_the_matrix(backend, label, scores, name):
+    loss = make_margin_loss(name, label, backend)
+    matrix = margin_matrix(name)
     values = synthesize(scores, SIZE).reshape(SIZE**2, -1)
     expected = analyze((matrix.T @ matrix @ values).reshape(SIZE, SIZE, -1))
     np.testing.assert_allclose(loss.normal(scores), expected, atol=1e-12)
 
 
-@pytest.mark.parametrize('anchor', ANCHORS)
-def test_normal_operator_is_self_adjoint(backend, rng, label, scores, anchor):
-    loss = make_margin_loss(anchor, label, 0.5, backend)
+@pytest.mark.parametrize('name', LOSSES)
+def test_normal_operator_is_self_adjoint(backend, rng, label, scores, name):
+    loss = make_margin_loss(name, label, backend)
     other = analyze(rng.normal(size=(SIZE, SIZE, 4)))
     np.testing.assert_allclose(inner(loss.normal(scores), other),
                                inner(scores, loss.normal(other)), rtol=1e-10)
@@ -89,60 +91,53 @@ def test_normal_operator_is_self_adjoint(backend, rng, label, scores, anchor):
 
 
 def test_coupling_has_one_eigenvalue_as_large_as_the_grid(backend, label):
-    loss = make_margin_loss('coupled', label, 0.5, backend)
+    loss = make_margin_loss('coupled', label, backend)
     ones = analyze(np.eye(1, SIZE**2).reshape(SIZE, SIZE, 1) * SIZE**2)
     ones[SIZE // 2, 0] = 0
     np.testing.assert_allclose(loss.normal(ones), SIZE**2 * ones, atol=1e-10)
 
 
-@pytest.mark.parametrize('anchor', ANCHORS)
-def test_targets_are_those_of_the_slack_step(backend, label, scores, anchor):
-    loss = make_margin_loss(anchor, label, 0.5, backend)
-    expected = margin_matrix(anchor).T @ targets(anchor, synthesize(scores, SIZE), label)
+@pytest.mark.parametrize('name', LOSSES)
+def test_targets_are_those_of_the_slack_step(backend, label, scores, name):
+    loss = make_margin_loss(name, label, backend)
+    expected = margin_matrix(name).T @ targets(name, synthesize(scores, SIZE), label)
     np.testing.assert_allclose(loss.slack_targets(scores),
                                analyze(expected.reshape(SIZE, SIZE, -1)), atol=1e-12)
 
 
-@pytest.mark.parametrize('anchor', ANCHORS)
-def test_losses_are_squared_hinges(backend, label, scores, anchor):
-    loss = make_margin_loss(anchor, label, 0.5, backend)
+@pytest.mark.parametrize('name', LOSSES)
+def test_losses_are_squared_hinges(backend, label, scores, name):
+    loss = make_margin_loss(name, label, backend)
     s, m = synthesize(scores, SIZE), label[:, :, None]
-    if anchor == 'unit':
-        expected = np.where(m >= 0.5, (s - m)**2, np.maximum(0, s - m)**2)
+    if name in CORE:
+        expected = np.where(m >= CORE[name], (s - m)**2, np.maximum(0, s - m)**2)
     else:
         expected = np.maximum(0, (1 - m) - (s[:1, :1] - s))**2
     np.testing.assert_allclose(loss.losses(scores), expected.mean(axis=(0, 1)), rtol=1e-12)
 
 
-@pytest.mark.parametrize('anchor', ['unit', 'coupled'])
-def test_slack_step_is_optimal(backend, label, scores, anchor):
+@pytest.mark.parametrize('name', ['unit', 'coupled'])
+def test_slack_step_is_optimal(backend, label, scores, name):
     # At the best slack, the squared distance of M s from its target is the hinge loss itself.
-    loss = make_margin_loss(anchor, label, 0.5, backend)
+    loss = make_margin_loss(name, label, backend)
     values = synthesize(scores, SIZE).reshape(SIZE**2, -1)
-    gap = margin_matrix(anchor) @ values - targets(anchor, values, label)
+    gap = margin_matrix(name) @ values - targets(name, values, label)
     np.testing.assert_allclose(loss.losses(scores), (gap**2).mean(axis=0), rtol=1e-12)
 
 
-@pytest.mark.parametrize('anchor', ['unit', 'coupled'])
-def test_perfect_scores_cost_nothing(backend, label, anchor):
-    loss = make_margin_loss(anchor, label, 0.5, backend)
+@pytest.mark.parametrize('name', ['unit', 'coupled'])
+def test_perfect_scores_cost_nothing(backend, label, name):
+    loss = make_margin_loss(name, label, backend)
     perfect = analyze(label[:, :, None])
     assert loss.losses(perfect)[0] == pytest.approx(0, abs=1e-20)
     np.testing.assert_allclose(loss.slack_targets(perfect), loss.normal(perfect), atol=1e-14)
 
 
 def test_wider_margins_cost_nothing(backend, label):
-    loss = make_margin_loss('coupled', label, 0.5, backend)
+    loss = make_margin_loss('coupled', label, backend)
     assert loss.losses(analyze(3 * label[:, :, None]))[0] == pytest.approx(0, abs=1e-20)
 
 
-def test_core_of_zero_is_ridge_regression(backend, label, scores):
-    loss = make_margin_loss('unit', np.maximum(label, 0), 0.0, backend)
-    s = synthesize(scores, SIZE)
-    expected = ((s - np.maximum(label, 0)[:, :, None])**2).mean(axis=(0, 1))
-    np.testing.assert_allclose(loss.losses(scores), expected, rtol=1e-12)
-
-
 def test_only_the_coupled_anchor_mixes_frequencies(backend, label):
-    mixes = [make_margin_loss(a, label, 0.5, backend).couples_frequencies for a in ANCHORS]
+    mixes = [make_margin_loss(name, label, backend).couples_frequencies for name in LOSSES]
     assert mixes == [False, True, False]

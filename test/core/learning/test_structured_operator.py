@@ -25,7 +25,7 @@ from lmsco_ros.core.learning.structured_operator import StructuredOperator
 
 TARGET = (0.25, 0.3)
 CONFIG = LearningConfig(
-    anchor='unit', solve='joint', core=0.5, margin_weight=1.0, label_sigma=0.25,
+    margin_weight=1.0, label_sigma=0.25,
     window_minimum=0.03, window_edge=0.05, memory_size=4, learning_rate=0.1,
     initial_iterations=15, iterations=4, gradient_steps=2)
 
@@ -40,44 +40,20 @@ def score_map(operator, sample):
     return synthesize(operator.scores([block[:, :, None, :] for block in sample]), 11)[:, :, 0]
 
 
-@pytest.mark.parametrize('anchor', ['unit', 'coupled'])
-@pytest.mark.parametrize('solve', ['joint', 'per_block'])
-def test_target_scores_highest_at_the_origin(backend, rng, anchor, solve):
+@pytest.mark.parametrize('loss', ['unit', 'coupled', 'ridge'])
+def test_target_scores_highest_at_the_origin(backend, rng, loss):
     sample = make_sample(rng)
-    operator = StructuredOperator(replace(CONFIG, anchor=anchor, solve=solve), sample, TARGET,
-                                  backend)
+    operator = StructuredOperator(replace(CONFIG, loss=loss), sample, TARGET, backend)
     scores = score_map(operator, sample)
     assert np.argmax(scores) == 0
     assert scores[0, 0] > 2 * np.abs(scores[4:7, 4:7]).max()
 
 
-def test_per_block_is_one_problem_for_each_block(backend, rng):
-    sample, later = make_sample(rng), make_sample(rng)
-    both = StructuredOperator(replace(CONFIG, solve='per_block'), sample, TARGET, backend)
-    alone = [StructuredOperator(CONFIG, [block], TARGET, backend) for block in sample]
-    for operator, blocks in [(both, later), *zip(alone, ([b] for b in later), strict=True)]:
-        operator.remember(blocks)
-        operator.train()
-    for block, single in zip(both.filters, alone, strict=True):
-        np.testing.assert_array_equal(block, single.filters[0])
-    assert both.objective() == pytest.approx(sum(single.objective() for single in alone))
-
-
-def test_one_block_is_the_same_problem_either_way(backend, rng):
-    sample = make_sample(rng)[:1]
-    joint, single = (StructuredOperator(replace(CONFIG, solve=solve), sample, TARGET, backend)
-                     for solve in ('joint', 'per_block'))
-    np.testing.assert_array_equal(joint.filters[0], single.filters[0])
-
-
-def test_joint_filters_fit_together(backend, rng):
-    # Each of the blocks alone reaches for the whole label; together they overshoot it.
+def test_filters_of_all_blocks_fit_together(backend, rng):
+    # Each of the blocks alone reaches for the whole label; beside each other they would overshoot.
     sample = make_sample(rng)
-    config = replace(CONFIG, margin_weight=20.0)
-    joint, single = (StructuredOperator(replace(config, solve=solve), sample, TARGET, backend)
-                     for solve in ('joint', 'per_block'))
-    assert abs(score_map(joint, sample)[0, 0] - 1) < 0.15
-    assert score_map(single, sample)[0, 0] > 1.5
+    operator = StructuredOperator(replace(CONFIG, margin_weight=20.0), sample, TARGET, backend)
+    assert abs(score_map(operator, sample)[0, 0] - 1) < 0.15
 
 
 def test_training_takes_in_what_was_remembered(backend, rng):

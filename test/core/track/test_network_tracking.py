@@ -58,8 +58,7 @@ def follow(config, frames):
 
 
 @pytest.mark.parametrize('learning', [
-    {}, {'solve': 'per_block'}, {'anchor': 'coupled', 'initial_iterations': 20}],
-    ids=['joint', 'per_block', 'coupled'])
+    {}, {'loss': 'coupled', 'initial_iterations': 20}], ids=['unit', 'coupled'])
 @pytest.mark.parametrize('scale', [CONFIG.scale, SEARCH], ids=['filter', 'search'])
 def test_a_still_scene_is_tracked_as_well_with_the_motion_block(
         make_scene, rng, random_weights, seen_flow, learning, scale):

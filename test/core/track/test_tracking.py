@@ -30,11 +30,10 @@ CONFIG = TrackerConfig(
     intensity=IntensityConfig(low_percentile=1, high_percentile=99, smoothing=0.2, jump=0.1),
     sampling=SamplingConfig(search_factor=5.0, patch_size_min=140, patch_size_max=140),
     learning=LearningConfig(
-        anchor='unit', solve='joint', core=0.5, margin_weight=1.0, label_sigma=1 / 12,
+        margin_weight=1.0, label_sigma=1 / 12,
         window_minimum=0.03, window_edge=0.05, memory_size=30, learning_rate=0.01,
         initial_iterations=30, iterations=3, gradient_steps=2, update_interval=5),
-    scale=ScaleConfig(estimator='filter', step=1.03, exponent_min=-8, exponent_max=8),
-    newton_steps=5)
+    scale=ScaleConfig(estimator='filter', step=1.03, exponent_min=-8, exponent_max=8))
 HANDCRAFTED = TrackerConfig.from_dict({
     'preset': 'hcs', 'sampling': {'patch_size_min': 140, 'patch_size_max': 140},
     'scale': {'estimator': 'filter', 'step': 1.02, 'exponent_min': -8, 'exponent_max': 8}})
