@@ -40,7 +40,7 @@ import numpy.typing as npt
 
 from lmsco_ros.core import (
     BoundingBox, BoxError, ImageError, LMSCOError, LMSCOTracker, TrackerConfig, TrackResult)
-from lmsco_ros.evaluation.datasets.frames import without_false_color
+from lmsco_ros.media.false_color import without_false_color
 
 
 class Tracker(Protocol):

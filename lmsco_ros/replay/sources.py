@@ -12,21 +12,23 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Sources of images: a folder, a video or a bag, told apart by looking."""
+"""Sources of images: a folder, an image, a film or a bag, told apart by looking."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol
+import warnings
 
 import cv2
 import numpy as np
 import numpy.typing as npt
 
-from lmsco_ros.evaluation.datasets.frames import ImageFiles, VideoFile
-from lmsco_ros.evaluation.errors import SequenceError
+from lmsco_ros.media.errors import MediaError, MediaWarning
+from lmsco_ros.media.image_files import IMAGE_SUFFIXES, ImageFiles
+from lmsco_ros.media.video import VideoFile
 from lmsco_ros.replay.bag_images import BagImages, is_bag
 from lmsco_ros.replay.errors import SourceError
 from lmsco_ros.replay.frame import Frame
@@ -55,11 +57,13 @@ def open_source(path: Path, *, topic: str = '', fps: float = 0.0) -> Source:
     Parameters
     ----------
     path : Path
-        Folder of images (png, jpg, tiff, bmp; 8 or 16 bit), video file, or rosbag2.
+        Folder of images (png, jpg, tiff, bmp, pgm; 8 or 16 bit), one image or TIFF stack,
+        film, or rosbag2.
     topic : str
         Image topic of a bag; may be left out when there is only one.
     fps : float
-        Frames per second of what has no stamps; by default the video's own, or 30.
+        Frames per second of images without times, by default 30; of a film it replaces the
+        times of the container.
 
     Raises
     ------
@@ -77,12 +81,14 @@ def open_source(path: Path, *, topic: str = '', fps: float = 0.0) -> Source:
                           'leave out the topic')
     if path.is_dir():
         return IndexedImages(_images_in(path), fps or _DEFAULT_FPS)
+    if path.suffix.lower() in IMAGE_SUFFIXES:
+        return IndexedImages(_images_of(path), fps or _DEFAULT_FPS)
     try:
-        video = VideoFile(path)
-    except SequenceError as error:
-        raise SourceError(f'{path} is not a readable video; give a video that OpenCV decodes, '
+        film = VideoFile(path)
+    except MediaError as error:
+        raise SourceError(f'{path.parent / str(error)}; give a film that FFmpeg decodes, '
                           'a folder of images or a bag') from error
-    return IndexedImages(video, fps or _stated_fps(path))
+    return IndexedImages(film, fps) if fps else TimedImages(film)
 
 
 @dataclass(frozen=True)
@@ -108,17 +114,36 @@ class IndexedImages:
 
     def __iter__(self) -> Iterator[Frame]:
         """Yield the frames, all gray or all in color; stamps start at 0."""
-        first: npt.NDArray | None = None
-        for index in range(len(self.images)):
-            try:
-                image = self.images[index]
-            except SequenceError as error:
-                if first is None or isinstance(self.images, ImageFiles):
-                    raise SourceError(f'{error}; repair or remove it') from error
-                # Containers often state some frames more than there are.
-                return
-            first = image if first is None else first
-            yield Frame(index, round(index * 1e9 / self.fps), _like(first, image))
+        return _frames((round(index * 1e9 / self.fps), image)
+                       for index, image in enumerate(self.images))
+
+
+@dataclass(frozen=True)
+class TimedImages:
+    """
+    Images of a film at the times of its container.
+
+    Attributes
+    ----------
+    film : VideoFile
+        Decoder.
+
+    """
+
+    film: VideoFile
+
+    @property
+    def fps(self) -> float:
+        """Frames per second, on average."""
+        return self.film.fps
+
+    def __len__(self) -> int:
+        """Return the number of frames that the container states."""
+        return len(self.film)
+
+    def __iter__(self) -> Iterator[Frame]:
+        """Yield the frames, all gray or all in color; stamps start at 0."""
+        return _frames(self.film.timed())
 
 
 def _images_in(folder: Path) -> ImageFiles:
@@ -132,17 +157,30 @@ def _images_in(folder: Path) -> ImageFiles:
     raise SourceError(f'{folder} has no images; {hint}')
 
 
-def _stated_fps(path: Path) -> float:
-    capture = cv2.VideoCapture(str(path))
-    fps = capture.get(cv2.CAP_PROP_FPS)
-    capture.release()
-    return float(fps) if 0.1 <= fps <= 1000 else _DEFAULT_FPS
+def _images_of(path: Path) -> ImageFiles:
+    """Return the pages of an image file; of a single one say that it may not be meant."""
+    images = ImageFiles((path,))
+    if len(images) == 1:
+        warnings.warn(f'{path} is one image; for a recording give the folder of its images',
+                      MediaWarning, stacklevel=3)
+    return images
 
 
-def _like(first: npt.NDArray, image: npt.NDArray) -> npt.NDArray:
-    """Return `image` with as many channels as `first`: sequences do not change halfway."""
-    if first.ndim == image.ndim:
+def _frames(images: Iterable[tuple[int, npt.NDArray]]) -> Iterator[Frame]:
+    """Yield stamps and images as frames with as many channels as the first has."""
+    dimensions = 0
+    try:
+        for index, (stamp, image) in enumerate(images):
+            dimensions = dimensions or image.ndim
+            yield Frame(index, stamp, _with_dimensions(image, dimensions))
+    except MediaError as error:
+        raise SourceError(str(error)) from error
+
+
+def _with_dimensions(image: npt.NDArray, dimensions: int) -> npt.NDArray:
+    """Return `image` in gray (2) or in color (3): sequences do not change halfway."""
+    if image.ndim == dimensions:
         return image
-    if first.ndim == 2:
+    if dimensions == 2:
         return cv2.cvtColor(image, cv2.COLOR_BGR2GRAY)
     return np.repeat(image[..., None], 3, axis=2)

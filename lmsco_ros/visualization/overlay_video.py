@@ -25,6 +25,7 @@ import numpy as np
 import numpy.typing as npt
 
 from lmsco_ros.core.types import BoundingBox, TrackResult
+from lmsco_ros.media.film import FilmWriter
 from lmsco_ros.visualization.display_range import DisplayRange
 from lmsco_ros.visualization.overlay import draw_box, draw_overlay
 
@@ -47,16 +48,13 @@ class OverlayVideo:
     Raises
     ------
     OSError
-        From `add`, when the film cannot be encoded.
+        From `add` and on leaving, when the film cannot be written; names the file.
 
     """
 
     def __init__(self, path: Path, fps: float) -> None:
-        self._path = path
-        self._fps = min(max(fps, 1.0), 240.0)
+        self._film = FilmWriter(path, min(max(fps, 1.0), 240.0))
         self._display_range = DisplayRange()
-        self._writer: cv2.VideoWriter | None = None
-        self._size = (0, 0)
 
     def __enter__(self) -> OverlayVideo:
         """Return the film."""
@@ -65,8 +63,7 @@ class OverlayVideo:
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None,
                  trace: TracebackType | None) -> None:
         """Finish the film."""
-        if self._writer is not None:
-            self._writer.release()
+        self._film.close()
 
     def add(self, image: npt.NDArray, result: TrackResult, *, label: str = '',
             truth: BoundingBox | None = None) -> npt.NDArray[np.uint8]:
@@ -94,26 +91,8 @@ class OverlayVideo:
             draw_box(large, scaled(truth, factor), _TRUTH_COLOR, thickness=1)
         canvas = draw_overlay(large, replace(result, box=scaled(result.box, factor)),
                               label=label)
-        self._write(canvas)
+        self._film.write(canvas)
         return view
-
-    def _write(self, canvas: npt.NDArray[np.uint8]) -> None:
-        if self._writer is None:
-            # Encoders want even sizes; a film keeps the size of its first frame.
-            self._size = (canvas.shape[1] + canvas.shape[1] % 2,
-                          canvas.shape[0] + canvas.shape[0] % 2)
-            codec = cv2.VideoWriter.fourcc(*'mp4v')
-            self._writer = cv2.VideoWriter(str(self._path), codec, self._fps, self._size)
-            if not self._writer.isOpened():
-                raise OSError(f'{self._path} cannot be encoded as a film; '
-                              'check the place and the free space')
-        width, height = self._size
-        right, below = width - canvas.shape[1], height - canvas.shape[0]
-        if 0 <= right <= 1 and 0 <= below <= 1:
-            canvas = cv2.copyMakeBorder(canvas, 0, below, 0, right, cv2.BORDER_REPLICATE)
-        else:
-            canvas = cv2.resize(canvas, self._size, interpolation=cv2.INTER_AREA)
-        self._writer.write(canvas)
 
 
 def enlargement(height: int) -> int:

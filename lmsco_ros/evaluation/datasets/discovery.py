@@ -20,7 +20,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Iterator, Union
 
-from lmsco_ros.evaluation.datasets.frames import ImageFiles
+from lmsco_ros.evaluation.datasets.frames import image_folder
 from lmsco_ros.evaluation.datasets.layouts import READERS
 from lmsco_ros.evaluation.datasets.sequence import TrackingSequence
 from lmsco_ros.evaluation.errors import DatasetError, SequenceError
@@ -95,6 +95,6 @@ def _read(folder: Path) -> Union[TrackingSequence, None]:
         sequence = reader(folder)
         if sequence is not None:
             return sequence
-    if any(ImageFiles.in_folder(folder / name) for name in _FRAME_FOLDERS):
+    if any(image_folder(folder / name) for name in _FRAME_FOLDERS):
         raise SequenceError('frames without ground truth')
     return None

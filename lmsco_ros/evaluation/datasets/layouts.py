@@ -31,7 +31,7 @@ import numpy.typing as npt
 
 from lmsco_ros.evaluation.datasets.attributes import read_attributes
 from lmsco_ros.evaluation.datasets.boxes_text import read_boxes
-from lmsco_ros.evaluation.datasets.frames import FrameSource, ImageFiles, VideoFile
+from lmsco_ros.evaluation.datasets.frames import FrameSource, image_folder, thermal_video
 from lmsco_ros.evaluation.datasets.sequence import TrackingSequence
 from lmsco_ros.evaluation.errors import SequenceError
 
@@ -48,7 +48,7 @@ def read_anti_uav(folder: Path) -> Optional[TrackingSequence]:
                    if (folder / name).is_file()), None)
     if labels is None:
         return None
-    frames = VideoFile.in_folder(folder) or _image_folder(folder, ('infrared', 'ir', '.'))
+    frames = thermal_video(folder) or _image_folder(folder, ('infrared', 'ir', '.'))
     return _sequence(folder, frames, _json_boxes(labels))
 
 
@@ -68,7 +68,7 @@ def read_otb(folder: Path) -> Optional[TrackingSequence]:
 def read_video(folder: Path) -> Optional[TrackingSequence]:
     """Read one video beside `groundtruth.txt` (0-based, `nan` rows where absent)."""
     labels = folder / 'groundtruth.txt'
-    frames = VideoFile.in_folder(folder) if labels.is_file() else None
+    frames = thermal_video(folder) if labels.is_file() else None
     return _sequence(folder, frames, read_boxes(labels)) if frames is not None else None
 
 
@@ -102,7 +102,7 @@ def _sequence(folder: Path, frames: Optional[FrameSource],
 
 
 def _image_folder(folder: Path, names: tuple[str, ...]) -> Optional[FrameSource]:
-    candidates = (ImageFiles.in_folder(folder / name) for name in names)
+    candidates = (image_folder(folder / name) for name in names)
     return next((frames for frames in candidates if frames is not None), None)
 
 
