@@ -18,7 +18,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from typing import NoReturn
+from typing import Any, NoReturn
+import warnings
 
 from rich.console import Console
 from rich.markup import escape
@@ -44,11 +45,32 @@ def plain_errors() -> Iterator[None]:
     from lmsco_ros.replay.errors import ReplayError
 
     try:
-        yield
+        with _told_warnings():
+            yield
     except ConfigError as error:
         fail(str(error), MISUSED)
     except (LMSCOError, EvaluationError, ReplayError, OSError) as error:
         fail(str(error), FAILED)
+
+
+@contextmanager
+def _told_warnings() -> Iterator[None]:
+    """Tell what is worth knowing about images and films like everything else."""
+    from lmsco_ros.media.errors import MediaWarning
+
+    with warnings.catch_warnings():
+        show_others = warnings.showwarning
+
+        def show(message: Warning | str, category: type[Warning], *place: Any,
+                 **more: Any) -> None:
+            if issubclass(category, MediaWarning):
+                warn(str(message))
+            else:
+                show_others(message, category, *place, **more)
+
+        warnings.simplefilter('default', MediaWarning)
+        warnings.showwarning = show
+        yield
 
 
 def fail(message: str, code: int) -> NoReturn:

@@ -28,15 +28,13 @@ import numpy.typing as npt
 from lmsco_ros.media.errors import MediaError
 from lmsco_ros.media.false_color import without_false_color
 from lmsco_ros.media.image_form import CommonForm
+from lmsco_ros.media.tiff_stack import page_count, STACK_SUFFIXES, StackReader
 
 IMAGE_SUFFIXES = frozenset({'.bmp', '.jpeg', '.jpg', '.pgm', '.png', '.tif', '.tiff'})
 
-_STACK_SUFFIXES = frozenset({'.tif', '.tiff'})
 _SAME_SUFFIXES = {'.jpeg': '.jpg', '.tiff': '.tif'}
 # Every depth and channel count as it is stored, turned as the file says.
 _AS_STORED = cv2.IMREAD_ANYDEPTH | cv2.IMREAD_ANYCOLOR
-# OpenCV goes through a stack from its beginning for every call: a few pages at a time.
-_PAGES_AT_ONCE = 16
 
 
 class ImageFiles:
@@ -57,7 +55,7 @@ class ImageFiles:
         """Keep the paths; nothing is decoded yet."""
         self._paths = paths
         self._form = CommonForm()
-        self._block: tuple[Path, int, tuple[npt.NDArray, ...]] | None = None
+        self._stacks = StackReader()
 
     @classmethod
     def in_folder(cls, folder: Path) -> ImageFiles | None:
@@ -88,7 +86,8 @@ class ImageFiles:
 
         """
         path, page = self._places[index]
-        stored = self._page(path, page) if path.suffix.lower() in _STACK_SUFFIXES \
+        suffix = path.suffix.lower()
+        stored = self._stacks.read(path, page) if suffix in STACK_SUFFIXES \
             else cv2.imread(str(path), _AS_STORED)
         name = path.name if page == 0 else f'page {page + 1} of {path.name}'
         if stored is None:
@@ -96,7 +95,6 @@ class ImageFiles:
         image = without_false_color(stored)
         if image.dtype == np.float64:
             image = image.astype(np.float32)
-        suffix = path.suffix.lower()
         self._form.require(image, name, _SAME_SUFFIXES.get(suffix, suffix))
         return image
 
@@ -104,22 +102,11 @@ class ImageFiles:
         """Yield the images."""
         return (self[index] for index in range(len(self)))
 
-    def __getstate__(self) -> dict:
-        """Leave decoded pages behind when the images go to another process."""
-        return {**self.__dict__, '_block': None}
-
     @cached_property
     def _places(self) -> tuple[tuple[Path, int], ...]:
         """File and page of each image."""
-        return tuple((path, page) for path in self._paths for page in range(_page_count(path)))
-
-    def _page(self, path: Path, page: int) -> npt.NDArray | None:
-        """Return a page of a stack, or None; neighbors are decoded with it."""
-        first = page - page % _PAGES_AT_ONCE
-        if self._block is None or self._block[:2] != (path, first):
-            self._block = path, first, _read_pages(path, first)
-        pages = self._block[2]
-        return pages[page - first] if page - first < len(pages) else None
+        return tuple((path, page) for path in self._paths for page in range(
+            page_count(path) if path.suffix.lower() in STACK_SUFFIXES else 1))
 
 
 def natural_order(path: Path) -> tuple[tuple[str | int, ...], str]:
@@ -132,21 +119,3 @@ def natural_order(path: Path) -> tuple[tuple[str | int, ...], str]:
     groups = re.split(r'(\d+)', path.stem.casefold())
     return tuple(int(group) if number % 2 else group
                  for number, group in enumerate(groups)), path.name
-
-
-def _page_count(path: Path) -> int:
-    """Return the pages of a file; one that cannot be read has one, to be told when asked for."""
-    if path.suffix.lower() not in _STACK_SUFFIXES:
-        return 1
-    try:
-        return max(cv2.imcount(str(path), _AS_STORED), 1)
-    except cv2.error:
-        return 1
-
-
-def _read_pages(path: Path, first: int) -> tuple[npt.NDArray, ...]:
-    try:
-        return tuple(cv2.imreadmulti(
-            str(path), start=first, count=_PAGES_AT_ONCE, flags=_AS_STORED)[1])
-    except cv2.error:
-        return ()

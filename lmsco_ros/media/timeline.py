@@ -17,15 +17,20 @@
 from __future__ import annotations
 
 from fractions import Fraction
+from math import floor
+
+# Times that are in disorder are so by a few frames.
+_RESTART_PERIODS = 5
 
 
 class Timeline:
     """
     The times of frames, from the first one on, always going forward.
 
-    A frame without a time comes one period after the frame before it. A frame whose time is
-    not later than that of the frame before it comes a nanosecond after it, so that no two
-    frames share a stamp.
+    A frame without a time comes one period after the frame before it, and so does one whose
+    time is far before that: there the container starts to count again, as where films were
+    joined. A frame whose time is just not later comes a nanosecond after the frame before it,
+    so that no two frames share a stamp.
 
     Parameters
     ----------
@@ -34,8 +39,8 @@ class Timeline:
 
     Attributes
     ----------
-    missing, repeated : int
-        How many frames had no time, and a time that was not later.
+    missing, repeated, restarts : int
+        How many frames had no time, had one that was not later, and began to count again.
 
     """
 
@@ -45,6 +50,7 @@ class Timeline:
         self._last: Fraction | None = None
         self.missing = 0
         self.repeated = 0
+        self.restarts = 0
 
     def stamp(self, seconds: Fraction | None) -> int:
         """
@@ -57,11 +63,20 @@ class Timeline:
 
         """
         time = self._since_first(seconds)
-        if self._last is not None and time <= self._last:
-            self.repeated += 1
-            time = self._last + 1
+        if self._last is not None and time < self._last + 1:
+            time = self._later(time, self._last)
         self._last = time
-        return round(time)
+        # Halves all go one way: what is a nanosecond apart stays so.
+        return floor(time + Fraction(1, 2))
+
+    def _later(self, time: Fraction, last: Fraction) -> Fraction:
+        """Return a time behind `last` for a frame that claims another."""
+        if self._origin is None or last - time < _RESTART_PERIODS * self._period:
+            self.repeated += 1
+            return last + 1
+        self.restarts += 1
+        self._origin -= last + self._period - time
+        return last + self._period
 
     def _since_first(self, seconds: Fraction | None) -> Fraction:
         if seconds is None:

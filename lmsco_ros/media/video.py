@@ -17,7 +17,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from contextlib import contextmanager
 from fractions import Fraction
 import hashlib
 from pathlib import Path
@@ -27,24 +26,24 @@ import warnings
 import numpy.typing as npt
 
 from lmsco_ros.media.decoded_frame import image_of
+from lmsco_ros.media.decoding import decode, DecodedFrame, image_streams, open_film, read_packets
 from lmsco_ros.media.errors import MediaError, MediaWarning
 from lmsco_ros.media.image_form import CommonForm
 from lmsco_ros.media.timeline import Timeline
 
 if TYPE_CHECKING:
-    from av import Packet, VideoFrame, VideoStream
+    from av import VideoStream
     from av.container import InputContainer
 
 _DEFAULT_FPS = Fraction(30)
-# Text is shown as if it were a film by a reader that is meant for the art of old terminals.
-_NO_FILM = 'tty'
-# A damaged place may stop the reader several times before it finds the next frame.
-_MOST_STOPS = 100
 
 
 class VideoFile:
     """
     Frames of a film, decoded forward; going back starts again at the first one.
+
+    With more than 8 bits, and where it shows no color, only the luminance is read. A film that
+    says so is turned, as in a player.
 
     Parameters
     ----------
@@ -67,13 +66,14 @@ class VideoFile:
         """Find the number of frames and their rate."""
         self._path = path
         self._form = CommonForm()
-        self._frames: Iterator[VideoFrame] | None = None
+        self._frames: Iterator[DecodedFrame] | None = None
         self._next = 0
-        with _opened(path) as (container, stream):
-            if len(_films(container)) > 1:
-                warnings.warn(f'{path.name} holds {len(_films(container))} films; the first is '
+        with open_film(path) as (container, stream):
+            streams = len(image_streams(container))
+            if streams > 1:
+                warnings.warn(f'{path.name} holds {streams} streams of images; the first is '
                               'read', MediaWarning, stacklevel=2)
-            self._length, self._rate = _length_and_rate(container, stream)
+            self._length, self._rate = _length_and_rate(container, stream, path.name)
         if not self._length:
             raise MediaError(f'{path.name} has no frames; it may not have been recorded to its '
                              'end')
@@ -106,19 +106,17 @@ class VideoFile:
         if not 0 <= index < self._length:
             raise IndexError(index)
         if self._frames is None or index < self._next:
-            self._frames, self._next = _decode(self._path), 0
-        for frame in self._frames:
+            self._frames, self._next = decode(self._path), 0
+        for decoded in self._frames:
             self._next += 1
             if self._next > index:
-                return self._image(frame, index, self._form)
+                return self._image(decoded, index, self._form)
         raise MediaError(f'{self._path.name} ends before frame {index}, '
                          f'although it states {self._length} frames')
 
     def __iter__(self) -> Iterator[npt.NDArray]:
         """Yield the frames to the end, wherever that is."""
-        form = CommonForm()
-        for index, frame in enumerate(_decode(self._path)):
-            yield self._image(frame, index, form)
+        return (image for _, image in self._play())
 
     def timed(self) -> Iterator[tuple[int, npt.NDArray]]:
         """
@@ -128,127 +126,74 @@ class VideoFile:
         ------
         tuple of int and ndarray
             Nanoseconds since the first frame, by the times of the container, and the image.
-            `MediaWarning` tells at the end where these times were of no use.
+
+        Warns
+        -----
+        MediaWarning
+            At the end, where these times were of no use.
 
         """
-        form, timeline = CommonForm(), Timeline(self._rate)
-        for index, frame in enumerate(_decode(self._path)):
-            image = self._image(frame, index, form)
-            yield timeline.stamp(_seconds(frame)), image
-        name = self._path.name
-        if timeline.missing:
-            warnings.warn(f'{name} has no times for {timeline.missing} frames; they follow at '
-                          f'{self.fps:g} frames/s', MediaWarning, stacklevel=2)
-        if timeline.repeated:
-            warnings.warn(f'{name} has {timeline.repeated} frames that are not later than the '
-                          'ones before them; they follow one nanosecond after', MediaWarning,
-                          stacklevel=2)
+        timeline = Timeline(self._rate)
+        for seconds, image in self._play():
+            yield timeline.stamp(seconds), image
+        for count, what in ((timeline.missing, f'have no time and follow at {self.fps:g} '
+                                               'frames/s'),
+                            (timeline.repeated, 'are not later than those before them and '
+                                                'follow a nanosecond after'),
+                            (timeline.restarts, 'start to count the time again and go on '
+                                                'where the one before was')):
+            if count:
+                warnings.warn(f'{self._path.name}: frames that {what}: {count}', MediaWarning,
+                              stacklevel=2)
+
+    def _play(self) -> Iterator[tuple[Fraction | None, npt.NDArray]]:
+        """Yield times and images to the end, and tell when that comes early."""
+        form, count = CommonForm(), 0
+        for decoded in decode(self._path):
+            yield decoded.seconds, self._image(decoded, count, form)
+            count += 1
+        if count < self._length:
+            _tell_missing(self._path.name, f'{self._length} frames', f'{count}')
 
     def __getstate__(self) -> dict:
         """Leave the decoder behind when the film goes to another process."""
         return {**self.__dict__, '_frames': None, '_next': 0}
 
-    def _image(self, frame: VideoFrame, index: int, form: CommonForm) -> npt.NDArray:
-        image = image_of(frame)
+    def _image(self, decoded: DecodedFrame, index: int, form: CommonForm) -> npt.NDArray:
+        image = image_of(decoded.frame)
         form.require(image, f'frame {index} of {self._path.name}', 'film')
         return image
 
 
-@contextmanager
-def _opened(path: Path) -> Iterator[tuple[InputContainer, VideoStream]]:
-    """
-    Open a film.
-
-    Raises
-    ------
-    MediaError
-        When it is none.
-
-    """
-    import av
-
-    try:
-        # A name with a colon is an address for FFmpeg, unless it begins with a slash.
-        container = av.open(str(path.absolute()))
-    except (av.FFmpegError, OSError) as error:
-        reason = 'the file is empty' if path.is_file() and not path.stat().st_size \
-            else error.strerror
-        raise MediaError(f'{path.name} is not a readable video ({reason})') from error
-    with container:
-        films = _films(container)
-        if not films or container.format.name == _NO_FILM:
-            kinds = ', '.join(sorted({stream.type for stream in container.streams} - {'video'}))
-            raise MediaError(f'{path.name} is not a readable video (it holds '
-                             f'{kinds or "no images"})')
-        yield container, films[0]
-
-
-def _films(container: InputContainer) -> list[VideoStream]:
-    """Return the streams of images; the cover of a piece of music is none."""
-    from av.stream import Disposition
-
-    return [stream for stream in container.streams.video
-            if not stream.disposition & Disposition.attached_pic
-            and stream.codec_context is not None]
-
-
-def _decode(path: Path) -> Iterator[VideoFrame]:
-    """Yield every frame that can be decoded, and tell how much could not."""
-    from av import FFmpegError
-
-    frames = damaged = 0
-    with _opened(path) as (container, stream):
-        for packet in _packets(container, stream):
-            try:
-                decoded = stream.codec_context.decode(packet)
-            except FFmpegError:
-                damaged += 1
-                continue
-            frames += len(decoded)
-            yield from decoded
-    if not frames:
-        raise MediaError(f'{path.name} has no frame that can be decoded; it is damaged')
-    if damaged:
-        warnings.warn(f'{path.name} is damaged: {damaged} pieces were left out, {frames} frames '
-                      'were read', MediaWarning, stacklevel=2)
-
-
-def _packets(container: InputContainer, stream: VideoStream) -> Iterator[Packet | None]:
-    """Yield what the decoder needs, None at the end; what is damaged is passed over."""
-    from av import FFmpegError
-
-    stops = 0
-    while stops < _MOST_STOPS:
-        try:
-            for packet in container.demux(stream):
-                if packet.size:
-                    yield packet
-                    stops = 0
-            break
-        except FFmpegError:
-            stops += 1
-    yield None
-
-
-def _length_and_rate(container: InputContainer, stream: VideoStream) -> tuple[int, Fraction]:
+def _length_and_rate(container: InputContainer, stream: VideoStream,
+                     name: str) -> tuple[int, Fraction]:
     """Return the number of frames and their average rate, as stated or else as counted."""
-    rate = _sane(stream.average_rate)
-    if rate and stream.frames and stream.duration is not None:
-        expected = stream.duration * stream.time_base * rate
+    stated = _sane(stream.average_rate)
+    if stated and stream.frames and stream.duration is not None:
+        expected = stream.duration * stream.time_base * stated
         # Films in fragments may state the frames of the first of them.
         if abs(expected - stream.frames) <= 2 + 0.02 * stream.frames:
-            return stream.frames, rate
-    times = [packet.pts for packet in _packets(container, stream) if packet is not None]
+            return stream.frames, stated
+    packets = [(packet.pts, packet.is_discard) for packet in read_packets(container, stream)]
+    times = [time for time, is_hidden in packets if not is_hidden]
     known = [time for time in times if time is not None]
     span = (max(known) - min(known)) * stream.time_base if len(known) == len(times) > 1 else 0
     measured = _sane((len(times) - 1) / Fraction(span)) if span else None
-    return len(times), measured or rate or _DEFAULT_FPS
+    if stream.frames > len(packets):
+        _tell_missing(name, f'{stream.frames} frames', f'{len(packets)}')
+    elif measured and container.duration and len(container.streams) == 1:
+        # Some containers count their length from the first frame, others from zero.
+        found = max(span, max(known) * stream.time_base) + 1 / measured
+        length = Fraction(container.duration, 1_000_000)
+        if length - found > max(2 / measured, length / 50):
+            _tell_missing(name, f'{float(length):.2f} s', f'{float(found):.2f} s')
+    return len(times), measured or stated or _DEFAULT_FPS
+
+
+def _tell_missing(name: str, stated: str, found: str) -> None:
+    warnings.warn(f'{name} states {stated}, of which {found} are there', MediaWarning,
+                  stacklevel=2)
 
 
 def _sane(rate: Fraction | None) -> Fraction | None:
     return rate if rate is not None and Fraction(1, 10) <= rate <= 1000 else None
-
-
-def _seconds(frame: VideoFrame) -> Fraction | None:
-    time = frame.pts if frame.pts is not None else frame.dts
-    return None if time is None or frame.time_base is None else time * frame.time_base

@@ -86,8 +86,8 @@ def open_source(path: Path, *, topic: str = '', fps: float = 0.0) -> Source:
     try:
         film = VideoFile(path)
     except MediaError as error:
-        raise SourceError(f'{path.parent / str(error)}; give a film that FFmpeg decodes, '
-                          'a folder of images or a bag') from error
+        raise SourceError(f'{error}; give a film that FFmpeg decodes, a folder of images '
+                          'or a bag') from error
     return IndexedImages(film, fps) if fps else TimedImages(film)
 
 

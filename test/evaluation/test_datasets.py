@@ -21,7 +21,9 @@ import numpy as np
 import pytest
 
 from lmsco_ros.evaluation.datasets import scan_dataset
-from lmsco_ros.evaluation.errors import DatasetError
+from lmsco_ros.evaluation.datasets.frames import thermal_video
+from lmsco_ros.evaluation.errors import DatasetError, SequenceError
+from lmsco_ros.media.false_color import without_false_color
 
 
 def images(folder, count, suffix='.png', color=False):
@@ -185,3 +187,22 @@ def test_real_sequences_are_all_understood(thermal_dev):
     assert groups == {'anti_uav_ir', 'drone_ir', 'ptb_tir', 'vot_tir'}
     assert {item.name.split('/')[0] for item in scan.broken} <= {'lepton_16bit'}
     assert all(sequence.frames[0].ndim == 2 for sequence in scan.sequences[::20])
+
+
+def test_real_clips_are_as_opencv_reads_them(thermal_dev):
+    clips = [*sorted(thermal_dev.glob('anti_uav_ir/*/*.avi'))[:1],
+             *sorted(thermal_dev.glob('drone_ir/*/*.mp4'))[::40]]
+    assert clips
+    for clip in clips:
+        frames, capture = thermal_video(clip.parent), cv2.VideoCapture(str(clip))
+        for index in range(len(frames)):
+            np.testing.assert_array_equal(frames[index], without_false_color(capture.read()[1]))
+        assert not capture.read()[0]
+
+
+def test_an_image_that_cannot_be_read_makes_the_sequence_a_broken_one(tmp_path):
+    images(tmp_path / 'ir', 2)
+    (tmp_path / 'ir' / '0002.png').write_bytes(b'no image')
+    text(tmp_path / 'groundtruth.txt', '1,1,3,3', '1,1,3,3')
+    with pytest.raises(SequenceError, match=r'0002\.png is not a readable image'):
+        only(tmp_path).frames[1]
