@@ -39,7 +39,7 @@ setup(
     python_requires='>=3.10,<3.13',
     install_requires=[
         'array-api-compat>=1.9,<2',
-        'av>=14,<19',
+        'av>=15,<19',
         'jinja2>=3.0,<4',
         'matplotlib>=3.5,<4',
         'numpy>=1.26,<3',

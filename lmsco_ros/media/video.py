@@ -16,7 +16,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from fractions import Fraction
 import hashlib
 from pathlib import Path
@@ -174,20 +175,46 @@ def _length_and_rate(container: InputContainer, stream: VideoStream,
         # Films in fragments may state the frames of the first of them.
         if abs(expected - stream.frames) <= 2 + 0.02 * stream.frames:
             return stream.frames, stated
-    packets = [(packet.pts, packet.is_discard) for packet in read_packets(container, stream)]
-    times = [time for time, is_hidden in packets if not is_hidden]
-    known = [time for time in times if time is not None]
-    span = (max(known) - min(known)) * stream.time_base if len(known) == len(times) > 1 else 0
-    measured = _sane((len(times) - 1) / Fraction(span)) if span else None
+    packets = [_PacketTime(packet.pts, packet.duration or 0, packet.is_discard)
+               for packet in read_packets(container, stream)]
+    shown = [packet for packet in packets if not packet.is_hidden]
+    rate = _measured_rate(shown, stream.time_base) or stated or _DEFAULT_FPS
     if stream.frames > len(packets):
         _tell_missing(name, f'{stream.frames} frames', f'{len(packets)}')
-    elif measured and container.duration and len(container.streams) == 1:
-        # Some containers count their length from the first frame, others from zero.
-        found = max(span, max(known) * stream.time_base) + 1 / measured
-        length = Fraction(container.duration, 1_000_000)
-        if length - found > max(2 / measured, length / 50):
-            _tell_missing(name, f'{float(length):.2f} s', f'{float(found):.2f} s')
-    return len(times), measured or stated or _DEFAULT_FPS
+    elif container.duration and len(container.streams) == 1:
+        _tell_early_end(name, Fraction(container.duration, 1_000_000), rate, shown,
+                        stream.time_base)
+    return len(shown), rate
+
+
+@dataclass(frozen=True)
+class _PacketTime:
+    """When a frame is shown and for how long, in units of its stream, and whether at all."""
+
+    time: int | None
+    duration: int
+    is_hidden: bool
+
+
+def _measured_rate(packets: Sequence[_PacketTime], unit: Fraction) -> Fraction | None:
+    times = [packet.time for packet in packets if packet.time is not None]
+    if len(times) < max(len(packets), 2) or min(times) == max(times):
+        return None
+    return _sane((len(times) - 1) / ((max(times) - min(times)) * unit))
+
+
+def _tell_early_end(name: str, length: Fraction, rate: Fraction,
+                    packets: Sequence[_PacketTime], unit: Fraction) -> None:
+    """Say where a film ends before its stated length is over."""
+    known = [packet for packet in packets if packet.time is not None]
+    if len(known) < len(packets) or not known:
+        return
+    last = max(known, key=lambda packet: packet.time)
+    shown = last.duration * unit or 1 / rate
+    # Some containers count their length from the first frame, others from zero.
+    end = last.time * unit - min(0, *(packet.time for packet in known)) * unit + shown
+    if length - end > max(2 * shown, length / 50):
+        _tell_missing(name, f'{float(length):.2f} s', f'{float(end):.2f} s')
 
 
 def _tell_missing(name: str, stated: str, found: str) -> None:

@@ -20,6 +20,7 @@ import re
 import subprocess
 import sys
 
+import av
 import cv2
 import numpy as np
 import pytest
@@ -123,3 +124,25 @@ def test_recordings_are_tracked_without_ros(lmsco, tmp_path, scene_folder, start
         env=dict(os.environ), capture_output=True, text=True, timeout=100)
     assert ended.returncode == 0, ended.stderr
     assert len(rows_of(tmp_path / 'run')) == 3
+
+
+def test_stamps_are_those_of_the_film_and_its_damage_is_a_note(lmsco, tmp_path, scene, start):
+    times = [index + 10 * (index > 6) for index in range(len(scene))]
+    with av.open(str(tmp_path / 'film.mkv'), 'w') as container:
+        stream = container.add_stream('ffv1', rate=25)
+        stream.height, stream.width = scene[0].image.shape
+        stream.pix_fmt = 'gray16le'
+        for frame, time in zip(scene, times):
+            image = av.VideoFrame.from_ndarray(frame.image, 'gray16le')
+            image.pts = time
+            container.mux(stream.encode(image))
+        container.mux(stream.encode(None))
+    content = (tmp_path / 'film.mkv').read_bytes()
+    (tmp_path / 'cut.mkv').write_bytes(content[:len(content) * 4 // 5])
+    whole, cut = (lmsco('track', tmp_path / name, '--init', start, '--output', tmp_path / name[:3])
+                  for name in ('film.mkv', 'cut.mkv'))
+    assert whole.exit_code == cut.exit_code == 0, whole.output + cut.output
+    assert [float(row['stamp']) for row in rows_of(tmp_path / 'fil')] == [t / 25 for t in times]
+    assert 'note:' not in whole.words
+    assert 'note: cut.mkv states ' in cut.words
+    assert 8 < len(rows_of(tmp_path / 'cut')) < 15

@@ -14,11 +14,13 @@
 
 """Folders, videos and bags give the same kind of frames; what is broken is named."""
 
+import av
 import cv2
 import numpy as np
 import pytest
 from rosbags.typesys import get_typestore, Stores
 
+from lmsco_ros.media.errors import MediaWarning
 from lmsco_ros.replay.bag_maker import create_bag, image_message, make_bag
 from lmsco_ros.replay.errors import SourceError
 from lmsco_ros.replay.sources import open_source
@@ -107,6 +109,24 @@ class TestFolder:
         with pytest.raises(SourceError, match=r'frame4\.png'):
             list(open_source(folder))
 
+    def test_another_size_is_named(self, folder):
+        cv2.imwrite(str(folder / 'frame7.png'), np.zeros((50, 64), np.uint16))
+        with pytest.raises(SourceError, match=r'frame7\.png has 64 x 50 .* but frame1\.png'):
+            list(open_source(folder))
+
+    def test_stack_in_a_folder_gives_all_pages(self, tmp_path, frames):
+        cv2.imwritemulti(str(tmp_path / 'stack.tif'), [frame.image for frame in frames])
+        for source in (open_source(tmp_path), open_source(tmp_path / 'stack.tif')):
+            read = list(source)
+            assert len(source) == len(read) == 10
+            for frame, original in zip(read, frames):
+                np.testing.assert_array_equal(frame.image, original.image)
+
+    def test_one_image_is_one_frame_and_says_so(self, folder, frames):
+        with pytest.warns(MediaWarning, match=r'frame3\.png is one image; .* give the folder'):
+            frame, = open_source(folder / 'frame3.png')
+        np.testing.assert_array_equal(frame.image, frames[2].image)
+
 
 class TestVideo:
     def test_gray_frames_and_their_rate(self, video):
@@ -119,7 +139,24 @@ class TestVideo:
             assert np.median(frame.image) == pytest.approx(10 * frame.index + 50, abs=2)
 
     def test_wanted_rate_wins(self, video):
-        assert open_source(video, fps=50).fps == 50
+        source = open_source(video, fps=50)
+        assert source.fps == 50
+        assert [frame.stamp_ns for frame in source][:3] == [0, 20_000_000, 40_000_000]
+
+    def test_sixteen_bits_at_the_times_of_the_container(self, tmp_path, frames):
+        path, times = tmp_path / 'counts.mkv', (0, 1, 2, 3, 20, 40, 60, 80, 81, 82)
+        with av.open(str(path), 'w') as container:
+            stream = container.add_stream('ffv1', rate=20)
+            stream.width, stream.height, stream.pix_fmt = 64, 48, 'gray16le'
+            for frame, time in zip(frames, times):
+                image = av.VideoFrame.from_ndarray(frame.image, 'gray16le')
+                image.pts = time
+                container.mux(stream.encode(image))
+            container.mux(stream.encode(None))
+        read = list(open_source(path))
+        assert [frame.stamp_ns for frame in read] == [50_000_000 * time for time in times]
+        for frame, original in zip(read, frames):
+            np.testing.assert_array_equal(frame.image, original.image)
 
     def test_no_video(self, tmp_path):
         path = tmp_path / 'film.mp4'
@@ -135,7 +172,8 @@ class TestVideo:
         writer.release()
         content = path.read_bytes()
         path.write_bytes(content[:len(content) * 2 // 3])
-        frames = list(open_source(path))
+        with pytest.warns(MediaWarning, match=r'cut\.avi states 40 frames, of which 2\d are'):
+            frames = list(open_source(path))
         assert 5 < len(frames) < 40
         assert [f.index for f in frames] == list(range(len(frames)))
 
