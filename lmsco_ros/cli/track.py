@@ -25,7 +25,7 @@ from typing import Annotated, Optional, TYPE_CHECKING
 import typer
 
 from lmsco_ros.cli.configuration import load_config
-from lmsco_ros.cli.console import fail, FAILED, frame_progress, MISUSED, plain_errors, say, warn
+from lmsco_ros.cli.console import fail, FAILED, frame_progress, MISUSED, plain_errors, say
 from lmsco_ros.cli.options import (
     Box, ConfigOption, FramesOption, parse_box, PresetOption, SourceArgument, TopicOption)
 

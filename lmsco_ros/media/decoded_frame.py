@@ -72,5 +72,5 @@ def _first_plane(frame: VideoFrame) -> npt.NDArray:
     size = {8: 'u1', 32: 'f4'}.get(frame.format.components[0].bits, 'u2')
     stored = np.dtype(size).newbyteorder('>' if frame.format.name.endswith('be') else '<')
     plane = frame.planes[0]
-    rows = np.frombuffer(plane, stored).reshape(frame.height, -1)
+    rows = np.frombuffer(memoryview(plane), stored).reshape(frame.height, -1)
     return rows[:, :frame.width].astype(stored.newbyteorder('='))

@@ -119,15 +119,12 @@ def decode(path: Path) -> Iterator[DecodedFrame]:
     """
     Yield every frame of a film that can be decoded.
 
+    What could not be decoded is told at the end, by a `MediaWarning`.
+
     Raises
     ------
     MediaError
         When it is no film, or nothing of it can be decoded.
-
-    Warns
-    -----
-    MediaWarning
-        At the end, when something could not be decoded.
 
     """
     from av import FFmpegError
@@ -136,7 +133,7 @@ def decode(path: Path) -> Iterator[DecodedFrame]:
     frames = damaged = 0
     with open_film(path) as (container, stream):
         # Readers of bare streams invent times.
-        timed = not container.format.flags & Flags.no_timestamps.value
+        timed = not Flags(container.format.flags) & Flags.no_timestamps
         for packet in chain(read_packets(container, stream), (None,)):
             try:
                 decoded = stream.codec_context.decode(packet)

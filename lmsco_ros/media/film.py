@@ -27,7 +27,7 @@ import numpy as np
 import numpy.typing as npt
 
 if TYPE_CHECKING:
-    from av import VideoStream
+    from av import FFmpegError, VideoStream
     from av.container import OutputContainer
 
 # A film that is being written is a row of fragments, each complete in itself; at the end it
@@ -102,7 +102,7 @@ class FilmWriter:
         except (av.FFmpegError, OSError) as error:
             raise self._named(error) from error
 
-    def _named(self, error: OSError) -> OSError:
+    def _named(self, error: FFmpegError | OSError) -> OSError:
         return OSError(error.errno, error.strerror, str(self._path))
 
 
@@ -153,7 +153,7 @@ def _add_stream(container: OutputContainer, rate: Fraction) -> VideoStream:
     return stream
 
 
-def _fit(image: npt.NDArray[np.uint8], width: int, height: int) -> npt.NDArray[np.uint8]:
+def _fit(image: npt.NDArray, width: int, height: int) -> npt.NDArray:
     """Return the image in another size; a row or column that is missing is repeated."""
     right, below = width - image.shape[1], height - image.shape[0]
     if 0 <= right <= 1 and 0 <= below <= 1:

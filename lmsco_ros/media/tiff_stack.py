@@ -58,11 +58,7 @@ def page_count(path: Path) -> int:
     """
     Return the number of pages that are there, 1 for a file that cannot be read.
 
-    Warns
-    -----
-    MediaWarning
-        When the file ends before its last page.
-
+    A file that ends before its last page is told by a `MediaWarning`.
     """
     try:
         pages = max(cv2.imcount(str(path), _AS_STORED), 1)

@@ -16,27 +16,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator
 from fractions import Fraction
 import hashlib
 from pathlib import Path
-from typing import TYPE_CHECKING
 import warnings
 
 import numpy.typing as npt
 
 from lmsco_ros.media.decoded_frame import image_of
-from lmsco_ros.media.decoding import decode, DecodedFrame, image_streams, open_film, read_packets
+from lmsco_ros.media.decoding import decode, DecodedFrame, image_streams, open_film
 from lmsco_ros.media.errors import MediaError, MediaWarning
+from lmsco_ros.media.film_length import length_and_rate, tell_missing
 from lmsco_ros.media.image_form import CommonForm
 from lmsco_ros.media.timeline import Timeline
-
-if TYPE_CHECKING:
-    from av import VideoStream
-    from av.container import InputContainer
-
-_DEFAULT_FPS = Fraction(30)
 
 
 class VideoFile:
@@ -74,7 +67,7 @@ class VideoFile:
             if streams > 1:
                 warnings.warn(f'{path.name} holds {streams} streams of images; the first is '
                               'read', MediaWarning, stacklevel=2)
-            self._length, self._rate = _length_and_rate(container, stream, path.name)
+            self._length, self._rate = length_and_rate(container, stream, path.name)
         if not self._length:
             raise MediaError(f'{path.name} has no frames; it may not have been recorded to its '
                              'end')
@@ -123,15 +116,12 @@ class VideoFile:
         """
         Yield the frames to the end, each behind its time.
 
+        Times that were of no use are told at the end, by a `MediaWarning`.
+
         Yields
         ------
         tuple of int and ndarray
             Nanoseconds since the first frame, by the times of the container, and the image.
-
-        Warns
-        -----
-        MediaWarning
-            At the end, where these times were of no use.
 
         """
         timeline = Timeline(self._rate)
@@ -154,7 +144,7 @@ class VideoFile:
             yield decoded.seconds, self._image(decoded, count, form)
             count += 1
         if count < self._length:
-            _tell_missing(self._path.name, f'{self._length} frames', f'{count}')
+            tell_missing(self._path.name, f'{self._length} frames', f'{count}')
 
     def __getstate__(self) -> dict:
         """Leave the decoder behind when the film goes to another process."""
@@ -164,63 +154,3 @@ class VideoFile:
         image = image_of(decoded.frame)
         form.require(image, f'frame {index} of {self._path.name}', 'film')
         return image
-
-
-def _length_and_rate(container: InputContainer, stream: VideoStream,
-                     name: str) -> tuple[int, Fraction]:
-    """Return the number of frames and their average rate, as stated or else as counted."""
-    stated = _sane(stream.average_rate)
-    if stated and stream.frames and stream.duration is not None:
-        expected = stream.duration * stream.time_base * stated
-        # Films in fragments may state the frames of the first of them.
-        if abs(expected - stream.frames) <= 2 + 0.02 * stream.frames:
-            return stream.frames, stated
-    packets = [_PacketTime(packet.pts, packet.duration or 0, packet.is_discard)
-               for packet in read_packets(container, stream)]
-    shown = [packet for packet in packets if not packet.is_hidden]
-    rate = _measured_rate(shown, stream.time_base) or stated or _DEFAULT_FPS
-    if stream.frames > len(packets):
-        _tell_missing(name, f'{stream.frames} frames', f'{len(packets)}')
-    elif container.duration and len(container.streams) == 1:
-        _tell_early_end(name, Fraction(container.duration, 1_000_000), rate, shown,
-                        stream.time_base)
-    return len(shown), rate
-
-
-@dataclass(frozen=True)
-class _PacketTime:
-    """When a frame is shown and for how long, in units of its stream, and whether at all."""
-
-    time: int | None
-    duration: int
-    is_hidden: bool
-
-
-def _measured_rate(packets: Sequence[_PacketTime], unit: Fraction) -> Fraction | None:
-    times = [packet.time for packet in packets if packet.time is not None]
-    if len(times) < max(len(packets), 2) or min(times) == max(times):
-        return None
-    return _sane((len(times) - 1) / ((max(times) - min(times)) * unit))
-
-
-def _tell_early_end(name: str, length: Fraction, rate: Fraction,
-                    packets: Sequence[_PacketTime], unit: Fraction) -> None:
-    """Say where a film ends before its stated length is over."""
-    known = [packet for packet in packets if packet.time is not None]
-    if len(known) < len(packets) or not known:
-        return
-    last = max(known, key=lambda packet: packet.time)
-    shown = last.duration * unit or 1 / rate
-    # Some containers count their length from the first frame, others from zero.
-    end = last.time * unit - min(0, *(packet.time for packet in known)) * unit + shown
-    if length - end > max(2 * shown, length / 50):
-        _tell_missing(name, f'{float(length):.2f} s', f'{float(end):.2f} s')
-
-
-def _tell_missing(name: str, stated: str, found: str) -> None:
-    warnings.warn(f'{name} states {stated}, of which {found} are there', MediaWarning,
-                  stacklevel=2)
-
-
-def _sane(rate: Fraction | None) -> Fraction | None:
-    return rate if rate is not None and Fraction(1, 10) <= rate <= 1000 else None

@@ -132,7 +132,8 @@ class TestOneForm:
     @pytest.mark.parametrize('other, words', [
         (('2.png', np.zeros((30, 32), np.uint8)), '32 x 30 pixels of uint8'),
         (('2.png', IMAGE.astype(np.uint16)), '32 x 24 pixels of uint16'),
-        (('2.jpg', IMAGE), r'32 x 24 pixels of uint8 \(\.jpg\)')], ids=['size', 'depth', 'kind of file'])
+        (('2.jpg', IMAGE), r'32 x 24 pixels of uint8 \(\.jpg\)'),
+    ], ids=['size', 'depth', 'kind of file'])
     def test_the_first_that_differs_is_named(self, tmp_path, other, words):
         for name, image in (('0.png', IMAGE), ('1.png', IMAGE), other, ('3.png', IMAGE)):
             cv2.imwrite(str(tmp_path / name), image)

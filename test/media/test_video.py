@@ -240,7 +240,7 @@ class TestDamage:
         path = film('c.mkv', counts * 3, pixels='gray16le', stored='gray16le')
         content = path.read_bytes()
         path.write_bytes(content[:len(content) // 2])
-        with pytest.warns(MediaWarning, match=r'c\.mkv states 1\.44 s, of which 0\.\d+ s are there'):
+        with pytest.warns(MediaWarning, match=r'c\.mkv states 1\.44 s, of which 0\.\d+ s are'):
             video = VideoFile(path)
         assert len(list(video)) == len(video) == pytest.approx(18, abs=2)
 
