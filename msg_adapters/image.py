@@ -13,7 +13,7 @@
 # limitations under the License.
 
 """
-Images: `sensor_msgs/Image` and `sensor_msgs/CompressedImage` <-> arrays.
+Raw images: `sensor_msgs/Image` <-> arrays.
 
 ==================  =====================
 encoding            array
@@ -36,11 +36,10 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-from msg_adapters.compressed_size import declared_size, JPEG_START, PNG_START
 from msg_adapters.errors import ImageMessageError
 
 if TYPE_CHECKING:
-    from sensor_msgs.msg import CompressedImage, Image
+    from sensor_msgs.msg import Image
     from std_msgs.msg import Header
 
 # Encoding -> (type of one value, values in a pixel).
@@ -54,9 +53,6 @@ ENCODINGS = MappingProxyType({
     'rgb8': (np.dtype(np.uint8), 3),
 })
 _NATIVE_IS_BIG_ENDIAN = sys.byteorder == 'big'
-_PNG_END, _JPEG_END = b'IEND\xaeB`\x82', b'\xff\xd9'
-# A small file may unfold to gigabytes; thermal sensors stay far below this.
-_MOST_COMPRESSED_PIXELS = 2 ** 26
 
 
 def image_from_message(message: Image) -> npt.NDArray:
@@ -122,86 +118,13 @@ def message_from_image(image: npt.NDArray, *, encoding: str = '',
     from sensor_msgs.msg import Image
     from std_msgs.msg import Header
 
-    encoding = _fitting_encoding(image, encoding)
+    encoding = fitting_encoding(image, encoding)
     pixels = cv2.cvtColor(image, cv2.COLOR_BGR2RGB) if encoding == 'rgb8' else image
     height, width = image.shape[:2]
     return Image(
         header=header or Header(), height=height, width=width, encoding=encoding,
         is_bigendian=_NATIVE_IS_BIG_ENDIAN, step=image.itemsize * image[0].size,
-        data=_byte_array(pixels))
-
-
-def image_from_compressed(message: CompressedImage) -> npt.NDArray:
-    """
-    Return the pixels of a jpeg or png message.
-
-    Parameters
-    ----------
-    message : sensor_msgs/CompressedImage
-        The data itself tells jpeg from png; `format` is not relied upon.
-
-    Returns
-    -------
-    ndarray, shape (H, W) uint8 or uint16 (png only), or (H, W, 3) uint8 (BGR)
-
-    Raises
-    ------
-    ImageMessageError
-        When the data is neither jpeg nor png, is incomplete or damaged, holds another
-        kind of pixels, or more of them than a camera sends.
-
-    """
-    data = np.frombuffer(message.data, np.uint8)
-    _check_complete(data, message.format)
-    _check_declared_size(data, message.format)
-    try:
-        pixels = cv2.imdecode(data, cv2.IMREAD_UNCHANGED)
-    except cv2.error as error:
-        raise ImageMessageError(
-            f'compressed image (format "{message.format}") was refused by the decoder: '
-            f'{error}; send smaller frames') from error
-    if pixels is None:
-        raise ImageMessageError(
-            f'compressed image (format "{message.format}", {data.size} bytes) is damaged; '
-            'expected a whole jpeg or png file: check the transport')
-    _fitting_encoding(pixels, '')
-    return pixels
-
-
-def compressed_from_image(image: npt.NDArray, *, codec: str = 'png',
-                          header: Header | None = None) -> CompressedImage:
-    """
-    Return a compressed message with the pixels of an array.
-
-    Parameters
-    ----------
-    image : ndarray, shape (H, W) or (H, W, 3)
-        uint8 or uint16; color as uint8, BGR.
-    codec : {'png', 'jpeg'}
-        png keeps every value; jpeg does not, and takes 8 bit only.
-    header : std_msgs/Header, optional
-        Stamp and frame; empty by default.
-
-    Raises
-    ------
-    ImageMessageError
-        When the codec is unknown or cannot hold the array.
-
-    """
-    from sensor_msgs.msg import CompressedImage
-    from std_msgs.msg import Header
-
-    if codec not in ('png', 'jpeg'):
-        raise ImageMessageError(f'codec "{codec}" is unknown; expected "png" or "jpeg"')
-    encoding = _fitting_encoding(image, '')
-    depths = {'png': (np.uint8, np.uint16), 'jpeg': (np.uint8,)}[codec]
-    if image.dtype not in depths:
-        raise ImageMessageError(
-            f'{codec} cannot hold {image.dtype} pixels; use '
-            + ('png for 16 bit' if image.dtype == np.uint16 else 'sensor_msgs/Image for floats'))
-    _, data = cv2.imencode('.png' if codec == 'png' else '.jpg', image)
-    return CompressedImage(header=header or Header(), data=_byte_array(data),
-                           format=f'{encoding}; {codec} compressed {encoding}')
+        data=byte_array(pixels))
 
 
 def _layout(encoding: str) -> tuple[np.dtype, int]:
@@ -233,8 +156,23 @@ def _check_size(message: Image, pixel_bytes: int) -> None:
             f'{message.height} rows of {message.step} bytes; check the driver and the transport')
 
 
-def _fitting_encoding(image: npt.NDArray, encoding: str) -> str:
-    """Return `encoding`, or by default the first, that holds arrays like `image`."""
+def fitting_encoding(image: npt.NDArray, encoding: str) -> str:
+    """
+    Return the encoding of a message that holds an array.
+
+    Parameters
+    ----------
+    image : ndarray
+        What has to be held.
+    encoding : str
+        The wanted one; empty for the first that fits.
+
+    Raises
+    ------
+    ImageMessageError
+        When none, or not the wanted one, fits.
+
+    """
     channels = 1 if image.ndim == 2 else image.shape[2] if image.ndim == 3 else 0
     fitting = [name for name, layout in ENCODINGS.items()
                if image.size and layout == (image.dtype, channels)]
@@ -249,34 +187,7 @@ def _fitting_encoding(image: npt.NDArray, encoding: str) -> str:
     return encoding or fitting[0]
 
 
-def _check_complete(data: npt.NDArray[np.uint8], declared: str) -> None:
-    """Refuse data that is no jpeg or png file, or one without its end."""
-    start, end = data[:4].tobytes(), data[-64:].tobytes().rstrip(b'\0')
-    if start == PNG_START:
-        complete = end.endswith(_PNG_END)
-    elif start.startswith(JPEG_START):
-        complete = end.endswith(_JPEG_END)
-    else:
-        raise ImageMessageError(
-            f'compressed image (format "{declared}", {data.size} bytes) is neither jpeg nor '
-            'png; publish one of these, or use the raw image topic')
-    if not complete:
-        # Some decoders fill what is missing with gray, which would be tracked in.
-        raise ImageMessageError(
-            f'compressed image (format "{declared}", {data.size} bytes) is truncated; expected '
-            'a whole jpeg or png file: check the driver and the transport')
-
-
-def _check_declared_size(data: npt.NDArray[np.uint8], declared: str) -> None:
-    """Refuse a file that would take more memory than any camera's image."""
-    width, height = declared_size(memoryview(data)) or (0, 0)
-    if width * height > _MOST_COMPRESSED_PIXELS:
-        raise ImageMessageError(
-            f'compressed image (format "{declared}", {data.size} bytes) claims {width} x {height} '
-            f'pixels; expected at most {_MOST_COMPRESSED_PIXELS}: send smaller frames')
-
-
-def _byte_array(values: npt.NDArray) -> array:
+def byte_array(values: npt.NDArray) -> array:
     """Return the bytes of an array as the one type that a message takes unchecked."""
     data = array('B')
     data.frombytes(memoryview(np.ascontiguousarray(values)).cast('B'))

@@ -39,8 +39,9 @@ from lmsco_ros.node.outcome import Frame
 from lmsco_ros.node.parameters import Settings
 from lmsco_ros.node.worker import TrackerWorker
 from msg_adapters.boxes import box_from_polygon, box_from_region
+from msg_adapters.compressed import image_from_compressed
 from msg_adapters.errors import MessageError
-from msg_adapters.image import image_from_compressed, image_from_message
+from msg_adapters.image import image_from_message
 from msg_adapters.status import Level
 
 _RELIABILITY = {

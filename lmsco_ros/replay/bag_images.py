@@ -147,7 +147,8 @@ class BagImages:
     def __iter__(self) -> Iterator[Frame]:
         """Yield the frames, with the stamps of their headers where these are set."""
         # Folders and videos are read through the same door, and need no messages.
-        from msg_adapters.image import image_from_compressed, image_from_message
+        from msg_adapters.compressed import image_from_compressed
+        from msg_adapters.image import image_from_message
 
         with open_bag(self._path) as reader:
             connection = choose_connection(reader, self._path, self.topic)

@@ -26,7 +26,8 @@ from visualization_msgs.msg import ImageMarker
 
 from lmsco_ros.core.types import TrackState
 from msg_adapters.boxes import detections_available
-from msg_adapters.image import compressed_from_image, image_from_message
+from msg_adapters.compressed import compressed_from_image
+from msg_adapters.image import image_from_message
 from msg_adapters.markers import box_from_marker
 from msg_adapters.status import diagnoses_from_message, Level
 
