@@ -23,15 +23,23 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-from msg_adapters.compressed_size import declared_size, JPEG_START, PNG_START
+from msg_adapters.compressed_depth import HEAD_BYTES, is_compressed_depth, read_depth_coding
+from msg_adapters.encodings import fitting_encoding, without_alpha
 from msg_adapters.errors import ImageMessageError
-from msg_adapters.image import byte_array, fitting_encoding
+from msg_adapters.image import byte_array
+from msg_adapters.image_file import ImageFile
+from msg_adapters.jpeg_file import JPEG_START, read_jpeg
+from msg_adapters.png_file import PNG_START, read_png
 
 if TYPE_CHECKING:
     from sensor_msgs.msg import CompressedImage
     from std_msgs.msg import Header
 
-_PNG_END, _JPEG_END = b'IEND\xaeB`\x82', b'\xff\xd9'
+__all__ = ['compressed_from_image', 'DecodingLimits', 'image_from_compressed']
+
+# 16-bit color with transparency takes twice as much, and gets half as many pixels.
+_PIXEL_BYTES = 4
+_LONGEST_NAME = 60
 
 
 @dataclass(frozen=True)
@@ -42,9 +50,10 @@ class DecodingLimits:
     Attributes
     ----------
     pixels : int
-        Most pixels of an image.
+        Most pixels of an image. At four bytes a pixel they are also the most memory that the
+        pixels of an image may take, and the longest file.
     scans : int
-        Most scans of a jpeg file.
+        Most scans of a jpeg file: the decoder goes over the whole image once for each.
 
     """
 
@@ -55,41 +64,39 @@ class DecodingLimits:
 def image_from_compressed(message: CompressedImage,
                           limits: DecodingLimits = DecodingLimits()) -> npt.NDArray:
     """
-    Return the pixels of a jpeg or png message.
+    Return the pixels of a jpeg or png message, also of the transport `compressedDepth`.
 
     Parameters
     ----------
     message : sensor_msgs/CompressedImage
-        The data itself tells jpeg from png; `format` is not relied upon.
+        The data itself tells jpeg from png; `format` only tells what the pixels of
+        `compressedDepth` are.
     limits : DecodingLimits, optional
         What decoding may cost; checked before anything is decoded.
 
     Returns
     -------
-    ndarray, shape (H, W) uint8 or uint16 (png only), or (H, W, 3) uint8 (BGR)
+    ndarray, shape (H, W) uint8 or uint16, or (H, W, 3) uint8 (BGR)
+        Without transparency; color of 16 bits becomes gray. Of `compressedDepth` also
+        float32.
 
     Raises
     ------
     ImageMessageError
-        When the data is neither jpeg nor png, is incomplete or damaged, holds another
-        kind of pixels, or more of them than a camera sends.
+        When the data is neither jpeg nor png, is incomplete or damaged, its size cannot be
+        read, or decoding it would cost more than the limits allow.
 
     """
-    data = np.frombuffer(message.data, np.uint8)
-    _check_complete(data, message.format)
-    _check_declared_size(data, message.format, limits)
+    data = memoryview(message.data)
     try:
-        pixels = cv2.imdecode(data, cv2.IMREAD_UNCHANGED)
-    except cv2.error as error:
+        if is_compressed_depth(data, message.format):
+            coding = read_depth_coding(data, message.format)
+            return coding.decode(_decode(data[HEAD_BYTES:], limits))
+        return _decode(data, limits)
+    except ImageMessageError as error:
         raise ImageMessageError(
-            f'compressed image (format "{message.format}") was refused by the decoder: '
-            f'{error}; send smaller frames') from error
-    if pixels is None:
-        raise ImageMessageError(
-            f'compressed image (format "{message.format}", {data.size} bytes) is damaged; '
-            'expected a whole jpeg or png file: check the transport')
-    fitting_encoding(pixels, '')
-    return pixels
+            f'compressed image (format "{message.format[:_LONGEST_NAME]}", {len(data)} bytes) '
+            f'{error}') from error
 
 
 def compressed_from_image(image: npt.NDArray, *, codec: str = 'png',
@@ -122,35 +129,52 @@ def compressed_from_image(image: npt.NDArray, *, codec: str = 'png',
     if image.dtype not in depths:
         raise ImageMessageError(
             f'{codec} cannot hold {image.dtype} pixels; use '
-            + ('png for 16 bit' if image.dtype == np.uint16 else 'sensor_msgs/Image for floats'))
+            + ('png for 16 bit' if image.dtype == np.uint16 else 'sensor_msgs/Image'))
     _, data = cv2.imencode('.png' if codec == 'png' else '.jpg', image)
     return CompressedImage(header=header or Header(), data=byte_array(data),
                            format=f'{encoding}; {codec} compressed {encoding}')
 
 
-def _check_complete(data: npt.NDArray[np.uint8], declared: str) -> None:
-    """Refuse data that is no jpeg or png file, or one without its end."""
-    start, end = data[:4].tobytes(), data[-64:].tobytes().rstrip(b'\0')
-    if start == PNG_START:
-        complete = end.endswith(_PNG_END)
-    elif start.startswith(JPEG_START):
-        complete = end.endswith(_JPEG_END)
+def _decode(data: memoryview, limits: DecodingLimits) -> npt.NDArray:
+    """Return the pixels of a jpeg or png file whose cost is within the limits."""
+    if data[:len(PNG_START)] == PNG_START:
+        file = read_png(data)
+    elif data[:len(JPEG_START)] == JPEG_START:
+        file = read_jpeg(data)
     else:
         raise ImageMessageError(
-            f'compressed image (format "{declared}", {data.size} bytes) is neither jpeg nor '
-            'png; publish one of these, or use the raw image topic')
-    if not complete:
-        # Some decoders fill what is missing with gray, which would be tracked in.
+            'is neither jpeg nor png; publish one of these, or use the raw image topic')
+    _check_cost(file, len(data), limits)
+    try:
+        pixels = cv2.imdecode(np.frombuffer(file.data, np.uint8), cv2.IMREAD_UNCHANGED)
+    except cv2.error as error:
         raise ImageMessageError(
-            f'compressed image (format "{declared}", {data.size} bytes) is truncated; expected '
-            'a whole jpeg or png file: check the driver and the transport')
+            f'was refused by the decoder: {error}; send smaller frames') from error
+    if pixels is None:
+        raise ImageMessageError(
+            'is damaged; expected a whole jpeg or png file: check the transport')
+    if pixels.shape[:2] != (file.height, file.width):
+        raise ImageMessageError(
+            f'claims {file.width} x {file.height} pixels and holds others; expected a whole jpeg '
+            'or png file: check the transport')
+    if file.gray and pixels.ndim == 3:
+        return cv2.extractChannel(pixels, 0)
+    return without_alpha(pixels)
 
 
-def _check_declared_size(data: npt.NDArray[np.uint8], declared: str,
-                         limits: DecodingLimits) -> None:
-    """Refuse a file that would take more memory than any camera's image."""
-    width, height = declared_size(memoryview(data)) or (0, 0)
-    if width * height > limits.pixels:
+def _check_cost(file: ImageFile, size: int, limits: DecodingLimits) -> None:
+    """Refuse a file that would take more than any camera's image."""
+    pixels, memory = file.width * file.height, _PIXEL_BYTES * limits.pixels
+    if pixels > limits.pixels or pixels * file.pixel_bytes > memory:
         raise ImageMessageError(
-            f'compressed image (format "{declared}", {data.size} bytes) claims {width} x {height} '
-            f'pixels; expected at most {limits.pixels}: send smaller frames')
+            f'claims {file.width} x {file.height} pixels of {file.pixel_bytes} bytes; expected at '
+            f'most {limits.pixels} pixels and {memory} bytes: send smaller frames, or raise the '
+            'limit of pixels')
+    if size > memory:
+        raise ImageMessageError(
+            f'is longer than the pixels of the largest image ({memory} bytes); send smaller '
+            'frames, or raise the limit of pixels')
+    if file.scans > limits.scans:
+        raise ImageMessageError(
+            f'takes {file.scans} scans; expected at most {limits.scans}: send baseline jpeg, or '
+            'raise the limit of scans')

@@ -25,7 +25,6 @@ from sensor_msgs.msg import CompressedImage
 from std_msgs.msg import Header
 
 from msg_adapters.compressed import compressed_from_image, image_from_compressed
-from msg_adapters.compressed_size import declared_size
 from msg_adapters.errors import ImageMessageError
 
 SIZES = st.tuples(st.integers(1, 12), st.integers(1, 12))
@@ -89,12 +88,9 @@ def test_padding_behind_the_file_is_harmless():
     np.testing.assert_array_equal(image_from_compressed(message), image)
 
 
-def test_other_files_and_pixels_are_refused():
+def test_other_files_are_refused():
     with pytest.raises(ImageMessageError, match='neither jpeg nor png'):
         image_from_compressed(CompressedImage(format='tiff', data=b'II*\0' + bytes(50)))
-    _, transparent = cv2.imencode('.png', np.zeros((2, 2, 4), np.uint8))
-    with pytest.raises(ImageMessageError, match=r'\(2, 2, 4\)'):
-        image_from_compressed(CompressedImage(data=transparent.tobytes()))
 
 
 @pytest.mark.parametrize('declared', [
@@ -136,19 +132,6 @@ def test_small_file_that_claims_a_huge_image_is_refused_before_it_is_decoded(mon
         message.data = array('B', data)
         with pytest.raises(ImageMessageError, match='claims 40000 x 40000'):
             image_from_compressed(message)
-
-
-@given(st.integers(1, 300), st.integers(1, 300), st.sampled_from(['png', 'jpeg']))
-def test_declared_size_is_that_of_the_image(width, height, codec):
-    data = compressed_from_image(np.zeros((height, width), np.uint8), codec=codec).data
-    assert declared_size(memoryview(data)) == (width, height)
-    assert declared_size(memoryview(data)[:11]) is None
-
-
-@given(st.binary(max_size=60),
-       st.sampled_from([b'\x89PNG', b'\xff\xd8', b'\xff\xd8\xff\xe0', b'']))
-def test_declared_size_of_anything_is_found_without_an_error(data, start):
-    declared_size(memoryview(start + data))
 
 
 def test_header_is_taken_over():
