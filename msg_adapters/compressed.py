@@ -38,7 +38,7 @@ if TYPE_CHECKING:
 __all__ = ['compressed_from_image', 'DecodingLimits', 'image_from_compressed']
 
 # 16-bit color with transparency takes twice as much, and gets half as many pixels.
-_PIXEL_BYTES = 4
+_PIXEL_BYTES, _FILE_BYTES = 4, 2
 _LONGEST_NAME = 60
 
 
@@ -47,18 +47,20 @@ class DecodingLimits:
     """
     What a compressed image may cost: a small file may unfold to gigabytes or take minutes.
 
+    The costliest image within the defaults takes about a second (`benchmarks.decoding_cost`).
+
     Attributes
     ----------
     pixels : int
         Most pixels of an image. At four bytes a pixel they are also the most memory that the
-        pixels of an image may take, and the longest file.
+        pixels may take, and at two bytes the longest file.
     scans : int
         Most scans of a jpeg file: the decoder goes over the whole image once for each.
 
     """
 
-    pixels: int = 2 ** 26
-    scans: int = 100
+    pixels: int = 2 ** 24
+    scans: int = 50
 
 
 def image_from_compressed(message: CompressedImage,
@@ -170,9 +172,9 @@ def _check_cost(file: ImageFile, size: int, limits: DecodingLimits) -> None:
             f'claims {file.width} x {file.height} pixels of {file.pixel_bytes} bytes; expected at '
             f'most {limits.pixels} pixels and {memory} bytes: send smaller frames, or raise the '
             'limit of pixels')
-    if size > memory:
+    if size > _FILE_BYTES * limits.pixels:
         raise ImageMessageError(
-            f'is longer than the pixels of the largest image ({memory} bytes); send smaller '
+            f'is too long; expected at most {_FILE_BYTES * limits.pixels} bytes: send smaller '
             'frames, or raise the limit of pixels')
     if file.scans > limits.scans:
         raise ImageMessageError(

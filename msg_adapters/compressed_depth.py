@@ -86,9 +86,15 @@ class DepthCoding:
 
 
 def is_compressed_depth(data: memoryview, declared: str) -> bool:
-    """Return whether a message is of this transport, by its format or by its bytes."""
-    return 'compresseddepth' in declared.lower() \
-        or data[HEAD_BYTES:HEAD_BYTES + len(PNG_START)] == PNG_START
+    """
+    Return whether a message is of this transport, by its format or by its bytes.
+
+    A png of counts that some publishers send under that format without the head is none.
+    """
+    declares = 'compresseddepth' in declared.lower()
+    if data[:len(PNG_START)] == PNG_START:
+        return declares and _encoding(declared) not in _COUNTS
+    return declares or data[HEAD_BYTES:HEAD_BYTES + len(PNG_START)] == PNG_START
 
 
 def read_depth_coding(data: memoryview, declared: str) -> DepthCoding:
@@ -113,7 +119,7 @@ def read_depth_coding(data: memoryview, declared: str) -> DepthCoding:
             'of the transport compressedDepth holds no png; expected a png behind 12 bytes: set '
             'the parameter "format" of the publisher to png (rvl is not read), or use the raw '
             'image topic')
-    encoding = declared.split(';')[0].strip().lower()
+    encoding = _encoding(declared)
     if encoding in _COUNTS:
         return DepthCoding(None)
     _, a, b = _HEAD.unpack(data[:HEAD_BYTES])
@@ -126,3 +132,8 @@ def read_depth_coding(data: memoryview, declared: str) -> DepthCoding:
             f'of the transport compressedDepth is quantized by {a:g} and {b:g}; expected finite '
             'numbers, the first above 0: check the parameters of the publisher')
     return DepthCoding((a, b))
+
+
+def _encoding(declared: str) -> str:
+    """Return the encoding in front of the format's semicolon."""
+    return declared.split(';')[0].strip().lower()
