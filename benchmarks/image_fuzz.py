@@ -15,19 +15,21 @@
 """
 Read thousands of generated images, most of them broken, and count what becomes of them.
 
-Raw messages with sizes, steps, encodings and data that need not fit each other; jpeg and png files
-and those of `compressedDepth` that are cut, changed, lengthened, or claim another size. Each has to
-be read or refused; anything else ends the run with its number. In the folder of the repository:
+Raw messages with sizes, steps, encodings and data that need not fit each other; jpeg and png
+files and those of `compressedDepth` that are cut, changed, lengthened, or claim another size.
+Each has to be read or refused; anything else ends the run with its number. In the folder of the
+repository:
 python -m benchmarks.image_fuzz [--count N] [--seed N] [--page docs/field.md]
 """
 
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 import struct
+from typing import Any
 
 import cv2
 import numpy as np
@@ -101,7 +103,8 @@ class Generator:
         if kind == 'raw':
             return self._raw()
         if kind == 'compressedDepth':
-            head = struct.pack('<iff', 0, *self._rng.normal(size=2).astype(np.float32))
+            scale = self._pick((100., 1., -1., 0., np.nan))
+            head = struct.pack('<iff', 0, scale, self._rng.normal())
             data = head + self._png(color=0, depth=16)
         else:
             data = self._png() if kind == 'png' else self._jpeg()
@@ -167,7 +170,7 @@ class Generator:
     def _place(self, data: bytes) -> int:
         return int(self._rng.integers(0, len(data) + 1))
 
-    def _pick(self, values):
+    def _pick(self, values: Sequence[Any]) -> Any:
         return values[self._rng.integers(0, len(values))]
 
 

@@ -29,6 +29,7 @@ import numpy as np
 import numpy.typing as npt
 
 from msg_adapters.errors import ImageMessageError
+from msg_adapters.jpeg_file import JPEG_START
 from msg_adapters.png_file import PNG_START
 
 __all__ = ['DepthCoding', 'HEAD_BYTES', 'is_compressed_depth', 'read_depth_coding']
@@ -89,11 +90,11 @@ def is_compressed_depth(data: memoryview, declared: str) -> bool:
     """
     Return whether a message is of this transport, by its format or by its bytes.
 
-    A png of counts that some publishers send under that format without the head is none.
+    A file of counts that some publishers send under that format without the head is none.
     """
     declares = 'compresseddepth' in declared.lower()
-    if data[:len(PNG_START)] == PNG_START:
-        return declares and _encoding(declared) not in _COUNTS
+    if data[:len(PNG_START)] == PNG_START or data[:len(JPEG_START)] == JPEG_START:
+        return declares and _encoding(declared) == _NUMBERS
     return declares or data[HEAD_BYTES:HEAD_BYTES + len(PNG_START)] == PNG_START
 
 

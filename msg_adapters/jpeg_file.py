@@ -37,8 +37,9 @@ _START_OF_FRAME = frozenset(range(0xC0, 0xD0)) - {0xC4, 0xC8, 0xCC}
 # Baseline, extended and progressive, with Huffman codes.
 _READABLE_FRAMES = frozenset({0xC0, 0xC1, 0xC2})
 _END, _START_OF_SCAN = 0xD9, 0xDA
-# DHT, DAC, DQT, DNL, DRI, APPn, COM.
-_SKIPPED = frozenset({0xC4, 0xCC, 0xDB, 0xDC, 0xDD, *range(0xE0, 0xF0), 0xFE})
+# Besides: DHT, DAC, DQT, DNL, DRI, APPn, COM.
+_SEGMENTS = _START_OF_FRAME | {_START_OF_SCAN, 0xC4, 0xCC, 0xDB, 0xDC, 0xDD,
+                               *range(0xE0, 0xF0), 0xFE}
 _MOST_SEGMENTS = 2 ** 16
 _REMEDY = 'expected a whole jpeg file: check the driver and the transport'
 
@@ -73,9 +74,6 @@ def read_jpeg(data: memoryview) -> ImageFile:
             frame = _read_frame(marker, segment)
         elif marker == _START_OF_SCAN:
             scans += 1
-        elif marker not in _SKIPPED:
-            raise ImageMessageError(f'has a marker FF{marker:02X}, at which its size cannot be '
-                                    f'told; {_REMEDY}')
     raise ImageMessageError(f'has more than {_MOST_SEGMENTS} segments; {_REMEDY}')
 
 
@@ -88,6 +86,9 @@ def _next_segment(data: memoryview, position: int) -> tuple[int, memoryview, int
     marker = data[start - 1]
     if marker == _END:
         return marker, data[start:start], start
+    if marker not in _SEGMENTS:
+        raise ImageMessageError(
+            f'has a marker FF{marker:02X}, at which its size cannot be told; {_REMEDY}')
     length = int.from_bytes(data[start:start + 2], 'big')
     if start + max(length, 2) > len(data):
         raise ImageMessageError(f'is truncated; {_REMEDY}')

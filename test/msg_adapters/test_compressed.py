@@ -24,7 +24,9 @@ import pytest
 from sensor_msgs.msg import CompressedImage
 from std_msgs.msg import Header
 
-from msg_adapters.compressed import compressed_from_image, image_from_compressed
+from benchmarks.costly_images import (jpeg_file, jpeg_segment, noise_png, png_chunk, png_file,
+                                      scans_jpeg)
+from msg_adapters.compressed import compressed_from_image, DecodingLimits, image_from_compressed
 from msg_adapters.errors import ImageMessageError
 
 SIZES = st.tuples(st.integers(1, 12), st.integers(1, 12))
@@ -119,19 +121,110 @@ def test_damaged_files_are_read_or_refused(codec, damage):
         assert 'expected' in str(error) or 'publish' in str(error) or 'send' in str(error)
 
 
-def test_small_file_that_claims_a_huge_image_is_refused_before_it_is_decoded(monkeypatch):
+@pytest.fixture
+def undecoded(monkeypatch):
+    """Fail where anything is spent on pixels."""
     monkeypatch.setattr(cv2, 'imdecode', lambda *args: pytest.fail('decoded'))
-    for codec, place in (('png', 16), ('jpeg', None)):
-        message = compressed_from_image(np.zeros((8, 8), np.uint8), codec=codec)
-        data = bytearray(message.data)
-        if codec == 'png':
-            data[place:place + 8] = (40000).to_bytes(4, 'big') * 2
-        else:
-            place = data.index(b'\xff\xc0')
-            data[place + 5:place + 9] = (40000).to_bytes(2, 'big') * 2
-        message.data = array('B', data)
-        with pytest.raises(ImageMessageError, match='claims 40000 x 40000'):
-            image_from_compressed(message)
+
+
+def _read(data, **limits):
+    return image_from_compressed(CompressedImage(data=data), DecodingLimits(**limits))
+
+
+@pytest.mark.parametrize('data', [
+    png_file(40000, 40000), jpeg_file(40000, 40000), jpeg_file(40000, 40000, components=3),
+    jpeg_file(40000, 40000, before=b'\xff\x01'), jpeg_file(40000, 40000, before=b'\xff\xd0' * 9)])
+def test_small_file_that_claims_a_huge_image_is_refused_before_it_is_decoded(data, undecoded):
+    with pytest.raises(ImageMessageError, match='claims 40000 x 40000.*send smaller frames'):
+        _read(data)
+
+
+@pytest.mark.parametrize('data', [
+    jpeg_file(64, 0), jpeg_file(64, 64, frame=0xC9), jpeg_file(64, 64, before=b'\xff\x02'),
+    png_file(64, 64, color=1), png_file(64, 64, before=png_chunk(b'ABCD', b''))])
+def test_size_that_cannot_be_told_is_refused_before_it_is_decoded(data, undecoded):
+    with pytest.raises(ImageMessageError, match='expected'):
+        _read(data)
+
+
+def test_pixels_have_a_limit(undecoded):
+    with pytest.raises(ImageMessageError, match='claims 8 x 4 pixels.*at most 31 pixels'):
+        _read(jpeg_file(8, 4), pixels=31)
+
+
+def test_deep_pixels_are_limited_by_their_memory():
+    data = noise_png(8, 4, color=6, depth=16, interlace=False)
+    with pytest.raises(ImageMessageError, match='8 x 4 pixels of 8 bytes.*at most 63 pixels and 252 bytes'):
+        _read(data, pixels=63)
+    assert _read(data, pixels=10 ** 4).shape == (4, 8)
+
+
+def test_scans_have_a_limit(monkeypatch):
+    data = scans_jpeg(64, 64, 12)
+    assert _read(data, scans=12).shape == (64, 64, 3)
+    monkeypatch.setattr(cv2, 'imdecode', lambda *args: pytest.fail('decoded'))
+    with pytest.raises(ImageMessageError, match='takes 12 scans; expected at most 11'):
+        _read(data, scans=11)
+    with pytest.raises(ImageMessageError, match='takes 1000 scans'):
+        _read(scans_jpeg(64, 64, 1000))
+
+
+def test_long_file_of_few_pixels_is_refused(undecoded):
+    data = jpeg_file(8, 8, before=jpeg_segment(0xE1, bytes(60000)))
+    with pytest.raises(ImageMessageError, match='too long; expected at most 8192 bytes'):
+        _read(data, pixels=4096)
+
+
+@pytest.mark.parametrize('start', [
+    b'BM', b'GIF89a', b'RIFF\0\0\0\0WEBP', b'MM\0*', b'P5\n9 9\n255\n', b'\xff\xd8\0',
+    b'\xffO\xffQ', b'\x89PNX\r\n\x1a\n'])
+def test_what_else_opencv_reads_does_not_reach_it(start, undecoded):
+    with pytest.raises(ImageMessageError, match='neither jpeg nor png; publish one of these'):
+        _read(start + bytes(200))
+
+
+@given(hnp.arrays(np.uint8, SIZES.map(lambda size: size + (4,))))
+def test_transparency_is_left_out(image):
+    data = cv2.imencode('.png', image)[1]
+    np.testing.assert_array_equal(_read(data.tobytes()), image[..., :3])
+
+
+@given(hnp.arrays(np.uint16, SIZES.map(lambda size: size + (3,))), st.booleans())
+def test_color_of_16_bits_becomes_gray(image, transparent):
+    stored = np.dstack([image, image[..., 0]]) if transparent else image
+    gray = image @ [.114, .587, .299]
+    back = _read(cv2.imencode('.png', stored)[1].tobytes())
+    assert back.dtype == np.uint16
+    np.testing.assert_allclose(back, gray, atol=8)
+
+
+@pytest.mark.parametrize('color, depth, dtype', [
+    (0, 8, np.uint8), (0, 16, np.uint16), (4, 8, np.uint8), (4, 16, np.uint16)])
+def test_interlaced_gray_with_and_without_transparency_is_gray(color, depth, dtype):
+    images = [_read(noise_png(16, 16, color=color, depth=depth, interlace=interlace))
+              for interlace in (False, True)]
+    assert all(image.shape == (16, 16) and image.dtype == dtype for image in images)
+
+
+def test_pixels_of_an_interlaced_png_stand_in_their_places():
+    """The passes of 2 x 2 pixels: the first, one to its right, and the row below."""
+    rows = b''.join(b'\0' + bytes(values) for values in ([10], [20], [30, 40]))
+    np.testing.assert_array_equal(_read(png_file(2, 2, interlace=1, rows=rows)),
+                                  [[10, 20], [30, 40]])
+
+
+def test_animation_gives_its_first_image():
+    image = np.arange(12, dtype=np.uint8).reshape(3, 4)
+    data = bytes(compressed_from_image(image).data)
+    animated = data[:33] + png_chunk(b'acTL', bytes((0, 0, 0, 2, 0, 0, 0, 0))) + data[33:-12] \
+        + png_chunk(b'fdAT', bytes(40)) + data[-12:]
+    np.testing.assert_array_equal(_read(animated), image)
+
+
+def test_second_image_behind_the_first_is_left_alone():
+    first, second = (bytes(compressed_from_image(np.full((8, 8), value, np.uint8),
+                                                 codec='jpeg').data) for value in (50, 200))
+    np.testing.assert_array_equal(_read(first + second), np.full((8, 8), 50))
 
 
 def test_header_is_taken_over():
