@@ -24,6 +24,8 @@ import numpy as np
 import pytest
 import yaml
 
+from msg_adapters.encodings import ALIASES, ENCODINGS
+
 REPOSITORY = Path(__file__).resolve().parents[2]
 README = (REPOSITORY / 'README.md').read_text()
 PICTURE_BYTES = 300_000
@@ -96,6 +98,13 @@ def test_service_table_is_offered_by_the_node(node):
     documented = documented_names(node, table('Services'))
     offered = offered_names(node.get_service_names_and_types_by_node, node, documented)
     assert documented.items() <= offered.items()
+
+
+def test_encoding_table_is_that_of_the_adapters():
+    """Every name and further spelling is told, and no other one."""
+    told = [name.lower() for names, _ in table('Image encodings')
+            for name in re.findall(r'\w+', ' '.join(re.findall(r'`(\w+)`', f'`{names}`')))]
+    assert sorted(set(told)) == sorted({*map(str.lower, ENCODINGS), *ALIASES})
 
 
 def test_python_example_runs(tmp_path, monkeypatch, capsys):
