@@ -37,7 +37,7 @@ class CallCost:
     Attributes
     ----------
     seconds : float
-        On the clock.
+        Of the processors; other programs do not count.
     mebibytes : float
         By which the resident size of the process grew at its highest.
 
@@ -50,9 +50,9 @@ class CallCost:
 def call_cost(function: Callable[[], object]) -> CallCost:
     """Call a function and return what that took; Linux only."""
     _CLEAR.write_text(_FORGET_THE_PEAK, encoding='ascii')
-    before, start = _peak_kibibytes(), time.perf_counter()
+    before, start = _peak_kibibytes(), time.process_time()
     function()
-    seconds = time.perf_counter() - start
+    seconds = time.process_time() - start
     return CallCost(seconds, (_peak_kibibytes() - before) / 1024)
 
 

@@ -92,7 +92,7 @@ def cost_table(files: Mapping[str, Callable[[], bytes]] = COSTLIEST) -> str:
         data = make()
         cost = decoding_cost(data)
         rows.append((name, len(data) / 2 ** 20, cost.seconds, cost.mebibytes))
-    return markdown_table(('image', 'file (MiB)', 'seconds', 'memory (MiB)'), rows)
+    return markdown_table(('image', 'file (MiB)', 'processor time (s)', 'memory (MiB)'), rows)
 
 
 def main(arguments: list[str] | None = None) -> None:

@@ -234,7 +234,7 @@ def main(arguments: list[str] | None = None) -> None:
     options = parser.parse_args(arguments)
     tallies = fuzz(options.count, options.seed)
     table = markdown_table(
-        ('images', 'read', 'refused', 'longest (s)', 'most memory (MiB)'),
+        ('images', 'read', 'refused', 'most processor time (s)', 'most memory (MiB)'),
         [(kind, tally.read, tally.refused, tally.seconds, tally.mebibytes)
          for kind, tally in tallies.items()])
     print(table)

@@ -27,7 +27,7 @@ from sensor_msgs.msg import Image, RegionOfInterest
 from std_msgs.msg import Header
 
 from lmsco_ros.core.errors import ImageError
-from msg_adapters.image import ENCODINGS
+from msg_adapters.encodings import ENCODINGS
 from msg_adapters.status import diagnoses_from_message, Level
 
 SIZES = st.integers(0, 70) | st.integers(0, 2 ** 32 - 1)
