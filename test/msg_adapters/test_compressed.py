@@ -24,8 +24,8 @@ import pytest
 from sensor_msgs.msg import CompressedImage
 from std_msgs.msg import Header
 
-from benchmarks.costly_images import (jpeg_file, jpeg_segment, noise_png, png_chunk, png_file,
-                                      scans_jpeg)
+from benchmarks.costly_images import (
+    jpeg_file, jpeg_segment, noise_png, png_chunk, png_file, scans_jpeg)
 from msg_adapters.compressed import compressed_from_image, DecodingLimits, image_from_compressed
 from msg_adapters.errors import ImageMessageError
 

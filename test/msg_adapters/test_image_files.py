@@ -21,8 +21,8 @@ from hypothesis import given, strategies as st
 import numpy as np
 import pytest
 
-from benchmarks.costly_images import (jpeg_file, jpeg_segment, noise_png, png_chunk, png_file,
-                                      scans_jpeg)
+from benchmarks.costly_images import (
+    jpeg_file, jpeg_segment, noise_png, png_chunk, png_file, scans_jpeg)
 from msg_adapters.errors import ImageMessageError
 from msg_adapters.jpeg_file import JPEG_START, read_jpeg
 from msg_adapters.png_file import PNG_START, read_png
