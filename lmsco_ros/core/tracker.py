@@ -23,8 +23,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-import pickle
+import copy
 from threading import Lock
+from typing import Any
 
 import numpy as np
 
@@ -78,15 +79,15 @@ class LMSCOTracker:
         self._kind = ''
         self._lock = Lock()
 
-    def __getstate__(self) -> bytes:
-        """Return everything but the lock, as it is between two calls."""
+    def __getstate__(self) -> dict[str, Any]:
+        """Return a copy of everything but the lock, as it is between two calls."""
         with self._alone():
-            state = {name: value for name, value in vars(self).items() if name != '_lock'}
-            return pickle.dumps(state, pickle.HIGHEST_PROTOCOL)
+            return copy.deepcopy({name: value for name, value in vars(self).items()
+                                  if name != '_lock'})
 
-    def __setstate__(self, state: bytes) -> None:
+    def __setstate__(self, state: dict[str, Any]) -> None:
         """Become the tracker whose state this is."""
-        vars(self).update(pickle.loads(state))
+        vars(self).update(state)
         self._lock = Lock()
         limit_threads(self.config.runtime.threads)
 
