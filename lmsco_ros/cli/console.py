@@ -16,12 +16,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+import os
 from typing import Any, NoReturn
 import warnings
 
-from rich.console import Console
+from rich.console import Console, RenderableType
 from rich.markup import escape
 from rich.progress import (
     BarColumn, DownloadColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn,
@@ -49,7 +50,9 @@ def plain_errors() -> Iterator[None]:
             yield
     except ConfigError as error:
         fail(str(error), MISUSED)
-    except (LMSCOError, EvaluationError, ReplayError, OSError) as error:
+    except OSError as error:
+        fail(_words(error), FAILED)
+    except (LMSCOError, EvaluationError, ReplayError) as error:
         fail(str(error), FAILED)
 
 
@@ -73,22 +76,40 @@ def _told_warnings() -> Iterator[None]:
         yield
 
 
+@contextmanager
+def telling_what_is_kept(describe: Callable[[], str]) -> Iterator[None]:
+    """
+    Say what is kept of work that is broken off, by an error or by a signal.
+
+    Parameters
+    ----------
+    describe : callable
+        Called when the work is over; returns what is kept and where, or nothing.
+
+    """
+    try:
+        yield
+    except BaseException:
+        kept = describe()
+        if kept:
+            warn(kept)
+        raise
+
+
 def fail(message: str, code: int) -> NoReturn:
     """Say what went wrong and leave."""
-    Console(stderr=True, soft_wrap=True).print(
-        f'[bold red]error:[/] {escape(message)}', highlight=False)
+    _print(_Terminal(stderr=True, soft_wrap=True), f'[bold red]error:[/] {escape(message)}')
     raise typer.Exit(code)
 
 
 def warn(message: str) -> None:
     """Say what is worth knowing although work goes on."""
-    Console(stderr=True, soft_wrap=True).print(
-        f'[yellow]note:[/] {escape(message)}', highlight=False)
+    _print(_Terminal(stderr=True, soft_wrap=True), f'[yellow]note:[/] {escape(message)}')
 
 
 def say(message: str) -> None:
     """Tell a result."""
-    Console(soft_wrap=True).print(escape(message), highlight=False)
+    _print(_Terminal(soft_wrap=True), escape(message))
 
 
 def show_table(heads: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
@@ -98,14 +119,22 @@ def show_table(heads: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
         table.add_column(head, no_wrap=number < len(heads) - 1)
     for row in rows:
         table.add_row(*map(escape, row))
-    Console().print(table)
+    _print(_Terminal(), table)
+
+
+def show_pairs(pairs: Sequence[tuple[str, str]]) -> None:
+    """Show names and values side by side."""
+    table = Table(show_header=False, box=None, padding=(0, 2, 0, 0))
+    for pair in pairs:
+        table.add_row(*map(escape, pair))
+    _print(_Terminal(soft_wrap=True), table)
 
 
 def byte_progress() -> Progress:
     """Return a progress display that counts bytes, on standard error."""
     return Progress(
         TextColumn('{task.description:<12}'), BarColumn(), DownloadColumn(),
-        TransferSpeedColumn(), TimeRemainingColumn(), console=Console(stderr=True))
+        TransferSpeedColumn(), TimeRemainingColumn(), console=_Terminal(stderr=True))
 
 
 def frame_progress() -> Progress:
@@ -113,4 +142,33 @@ def frame_progress() -> Progress:
     return Progress(
         TextColumn('{task.description:<12}'), BarColumn(), MofNCompleteColumn(),
         TextColumn('frames'), TimeElapsedColumn(), TimeRemainingColumn(),
-        console=Console(stderr=True))
+        console=_Terminal(stderr=True))
+
+
+class _Terminal(Console):
+    """A console whose reader may leave while work goes on: results are in files."""
+
+    def on_broken_pipe(self) -> None:
+        """Go on unheard, also when the program ends and what is buffered is written."""
+        unheard = os.open(os.devnull, os.O_WRONLY)
+        os.dup2(unheard, self.file.fileno())
+        os.close(unheard)
+
+
+def _print(terminal: _Terminal, content: RenderableType) -> None:
+    try:
+        terminal.print(content, highlight=False)
+    except BrokenPipeError:
+        terminal.on_broken_pipe()
+    except OSError as error:
+        # A complaint that nobody can read, after a terminal was closed, is no further error.
+        if not terminal.stderr:
+            terminal.on_broken_pipe()
+            raise OSError(error.errno, error.strerror, 'standard output') from error
+
+
+def _words(error: OSError) -> str:
+    """Return an error of the operating system without its number."""
+    if error.strerror is None:
+        return str(error)
+    return f'{error.filename}: {error.strerror}' if error.filename else error.strerror

@@ -16,23 +16,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated, TYPE_CHECKING
 
-import numpy as np
-import numpy.typing as npt
-from rich.console import Console
 from rich.progress import Progress
-from rich.table import Table
 import typer
 
 from lmsco_ros.cli.configuration import load_config, node_parameters
-from lmsco_ros.cli.console import fail, FAILED, frame_progress, plain_errors, say
-from lmsco_ros.cli.options import ConfigOption, PresetOption
+from lmsco_ros.cli.console import (
+    fail, FAILED, frame_progress, plain_errors, say, show_pairs, telling_what_is_kept)
+from lmsco_ros.cli.options import ConfigOption, OverwriteOption, PresetOption
 from lmsco_ros.cli.ros import require_ros
 
 if TYPE_CHECKING:
+    import numpy as np
+    import numpy.typing as npt
+
+    from lmsco_ros.replay.run_outputs import RunOutputs
     from lmsco_ros.replay.scene_run import TrackedFrame
     from lmsco_ros.synthetic import SceneConfig, SceneFrame
 
@@ -46,6 +47,7 @@ def demo(
     output: Annotated[Path, typer.Option(
         file_okay=False, help='Folder for boxes.csv, overlay.mp4 and summary.png.')] = Path(
             'output/demo'),
+    overwrite: OverwriteOption = False,
     preset: PresetOption = 'default',
     config: ConfigOption = None,
     frames: Annotated[int, typer.Option(min=2, help='Length of the scene.')] = 360,
@@ -60,20 +62,17 @@ def demo(
     with plain_errors():
         require_ros()
         load_config(preset, config)
-        from lmsco_ros.replay.scene_run import run_scene
+        from lmsco_ros.replay.run_outputs import RunOutputs
         from lmsco_ros.synthetic import SceneConfig
 
         plot = SceneConfig(width=width, height=height, frames=frames, fps=rate, seed=seed)
-        with frame_progress() as progress:
+        outputs = RunOutputs(output, plot.fps, overwrite=overwrite, title=(
+            f'rendered scene {plot.seed}  ·  {config.stem if config else preset}'))
+        with telling_what_is_kept(lambda: outputs.kept), outputs, frame_progress() as progress:
             scene = _render(plot, progress)
-            task = progress.add_task('tracking', total=frames)
-            tracked = run_scene(scene, node_parameters(preset, config),
-                                lambda: progress.advance(task))
-            if not tracked:
-                fail('the node answered no frame', FAILED)
-            task = progress.add_task('writing', total=len(tracked))
-            for _ in _write(tracked, plot, config.stem if config else preset, output):
-                progress.advance(task)
+            tracked = _track(scene, node_parameters(preset, config), outputs, progress)
+        if not tracked:
+            fail('the node answered no frame', FAILED)
         _tell(tracked, frames)
         say(f'boxes.csv, overlay.mp4 and summary.png are in {output}')
 
@@ -86,22 +85,32 @@ def _render(plot: SceneConfig, progress: Progress) -> list[SceneFrame]:
                                description='rendering'))
 
 
-def _write(tracked: Sequence[TrackedFrame], plot: SceneConfig, tracker: str,
-           folder: Path) -> Iterator[None]:
-    """Write the outputs, frame by frame."""
+def _track(scene: Sequence[SceneFrame], parameters: dict[str, str], outputs: RunOutputs,
+           progress: Progress) -> list[TrackedFrame]:
+    """Run the node; rows are written as it answers, pictures when it has nothing to do."""
     from lmsco_ros.replay.frame import Frame
-    from lmsco_ros.replay.run_outputs import RunOutputs
+    from lmsco_ros.replay.scene_run import SceneRun
 
-    title = f'rendered scene {plot.seed}  ·  {tracker}'
-    with RunOutputs(folder, plot.fps, title) as outputs:
-        for item in tracked:
+    def write_row(item: TrackedFrame) -> None:
+        outputs.add_row(item.frame.index, item.frame.stamp_ns, item.result)
+
+    task = progress.add_task('tracking', total=len(scene))
+    run = SceneRun(scene, on_sent=lambda: progress.advance(task), on_answer=write_row)
+    try:
+        run.play(parameters)
+    finally:
+        tracked = run.tracked()
+        for item in progress.track(tracked, description='writing'):
             frame = item.frame
-            outputs.add(Frame(frame.index, frame.stamp_ns, frame.image), item.result, frame.box)
-            yield
+            outputs.add_picture(Frame(frame.index, frame.stamp_ns, frame.image), item.result,
+                                frame.box)
+    return tracked
 
 
 def _tell(tracked: Sequence[TrackedFrame], sent: int) -> None:
     """Print overlap, precision and latency."""
+    import numpy as np
+
     from lmsco_ros.core import TrackState
     from lmsco_ros.evaluation.geometry import overlaps
     from lmsco_ros.evaluation.protocols.one_pass import one_pass_figures
@@ -112,20 +121,19 @@ def _tell(tracked: Sequence[TrackedFrame], sent: int) -> None:
     figures = one_pass_figures(truth, boxes)
     latency = 1e3 * np.array([item.latency for item in tracked])
     tracker = 1e3 * np.array([item.tracker_seconds for item in tracked])
-    table = Table(show_header=False, box=None, padding=(0, 2, 0, 0))
-    for name, value in (
-            ('frames answered', f'{len(tracked)} of {sent}'),
-            ('mean overlap', f'{overlaps(truth, boxes).mean():.3f}'),
-            ('success (area under curve)', f'{figures.success_auc:.3f}'),
-            ('precision at 5 px / 20 px',
-             f'{figures.precision_at(5):.3f} / {figures.precision_at(20):.3f}'),
-            ('latency, image to box', _milliseconds(latency)),
-            ('of which tracker', _milliseconds(tracker)),
-            ('of which node and transport', _milliseconds(latency - tracker))):
-        table.add_row(name, value)
-    Console(soft_wrap=True).print(table)
+    show_pairs((
+        ('frames answered', f'{len(tracked)} of {sent}'),
+        ('mean overlap', f'{overlaps(truth, boxes).mean():.3f}'),
+        ('success (area under curve)', f'{figures.success_auc:.3f}'),
+        ('precision at 5 px / 20 px',
+         f'{figures.precision_at(5):.3f} / {figures.precision_at(20):.3f}'),
+        ('latency, image to box', _milliseconds(latency)),
+        ('of which tracker', _milliseconds(tracker)),
+        ('of which node and transport', _milliseconds(latency - tracker))))
 
 
 def _milliseconds(values: npt.NDArray[np.float64]) -> str:
+    import numpy as np
+
     middle, high = np.percentile(values, (50, 95))
     return f'p50 {middle:.1f} ms, p95 {high:.1f} ms'

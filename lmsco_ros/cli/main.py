@@ -16,24 +16,41 @@
 
 from __future__ import annotations
 
-import typer
+from typing import TYPE_CHECKING
 
-from lmsco_ros.cli import demo, evaluate, make_bag, replay, track, weights
+from lmsco_ros.cli.interruption import ended_by_signals
+
+if TYPE_CHECKING:
+    import typer
 
 
 def build_app() -> typer.Typer:
     """Return the application with all its commands."""
+    import typer
+
+    from lmsco_ros.cli import demo, evaluate, make_bag, replay, track, version, weights
+
     app = typer.Typer(
-        name='lmsco', no_args_is_help=True, add_completion=False,
-        pretty_exceptions_enable=False, help='Follow targets in thermal video.')
-    for command in (track, replay, make_bag, demo, evaluate, weights):
+        name='lmsco', no_args_is_help=True, pretty_exceptions_enable=False,
+        context_settings={'help_option_names': ['-h', '--help']})
+    for command in (version, track, replay, make_bag, demo, evaluate, weights):
         command.register(app)
     return app
 
 
 def main() -> None:
-    """Run the command line and leave with its exit code: 0 ok, 1 failed, 2 misused."""
-    build_app()()
+    """
+    Run the command line and leave with its exit code.
+
+    0 is ok, 1 failed, 2 misused, 128 + number ended by a signal.
+    """
+    # The imports take long enough to be interrupted.
+    with ended_by_signals():
+        try:
+            build_app()(prog_name='lmsco')
+        except OSError as error:
+            # Commands tell theirs; this is a help that found no room on standard output.
+            raise SystemExit(f'error: {error}') from error
 
 
 if __name__ == '__main__':

@@ -25,13 +25,16 @@ from typing import Annotated, Optional, TYPE_CHECKING
 import typer
 
 from lmsco_ros.cli.configuration import load_config
-from lmsco_ros.cli.console import fail, FAILED, frame_progress, MISUSED, plain_errors, say
+from lmsco_ros.cli.console import (
+    fail, FAILED, frame_progress, MISUSED, plain_errors, say, telling_what_is_kept, warn)
 from lmsco_ros.cli.options import (
-    Box, ConfigOption, FramesOption, parse_box, PresetOption, SourceArgument, TopicOption)
+    Box, ConfigOption, FramesOption, OverwriteOption, parse_box, PresetOption, SourceArgument,
+    TopicOption)
 
 if TYPE_CHECKING:
     from lmsco_ros.core import BoundingBox, LMSCOTracker, TrackResult
     from lmsco_ros.replay.frame import Frame
+    from lmsco_ros.replay.run_outputs import RunOutputs
     from lmsco_ros.replay.sources import Source
 
 
@@ -52,6 +55,7 @@ def track(
     output: Annotated[Optional[Path], typer.Option(
         file_okay=False, show_default='output/<source>',
         help='Folder for boxes.csv, overlay.mp4 and summary.png.')] = None,
+    overwrite: OverwriteOption = False,
     frames: FramesOption = None,
     ground_truth: Annotated[Optional[Path], typer.Option(
         exists=True, dir_okay=False, show_default=False,
@@ -60,17 +64,23 @@ def track(
     """Follow a target through a folder of images, a video or a bag."""
     if init is None and ground_truth is None:
         fail('no target; give --init x,y,w,h, or a --ground-truth that starts with it', MISUSED)
+    folder = output or Path('output') / source.resolve().stem
+    if folder.resolve() == source.resolve():
+        fail(f'{folder} is the source; choose another --output', MISUSED)
     with plain_errors():
         from lmsco_ros.core import LMSCOTracker
+        from lmsco_ros.replay.run_outputs import RunOutputs
         from lmsco_ros.replay.sources import open_source
 
-        tracker = LMSCOTracker(load_config(preset, config))
+        settings = load_config(preset, config)
         images = open_source(source, topic=topic)
         truth = _read_truth(ground_truth)
         start = _start_box(init, truth)
-        folder = output or Path('output') / source.resolve().stem
-        _run(tracker, images, start, truth, folder,
-             title=f'{_title(source)}  ·  {config.stem if config else preset}', limit=frames)
+        outputs = RunOutputs(folder, images.fps, overwrite=overwrite,
+                             title=f'{_title(source)}  ·  {config.stem if config else preset}')
+        with telling_what_is_kept(lambda: outputs.kept):
+            _run(LMSCOTracker(settings), images, start, truth, outputs, limit=frames)
+        say(f'boxes.csv, overlay.mp4 and summary.png are in {folder}')
 
 
 def _read_truth(path: Optional[Path]) -> list[Optional[BoundingBox]]:
@@ -102,17 +112,16 @@ def _title(source: Path) -> str:
 
 
 def _run(tracker: LMSCOTracker, images: Source, start: BoundingBox,
-         truth: list[Optional[BoundingBox]], folder: Path, *, title: str,
-         limit: Optional[int]) -> None:
+         truth: list[Optional[BoundingBox]], outputs: RunOutputs, *, limit: Optional[int]) -> None:
     """Track, write the outputs and tell the figures."""
-    from lmsco_ros.replay.run_outputs import RunOutputs
-
     expected = min(len(images), limit or len(images))
     seconds, count, overlaps = 0.0, 0, []
-    with RunOutputs(folder, images.fps, title) as outputs, frame_progress() as progress:
+    with outputs, frame_progress() as progress:
         task = progress.add_task('tracking', total=expected)
         for frame, result, spent in _results(tracker, islice(images, limit), start):
             known = truth[frame.index] if frame.index < len(truth) else None
+            if not count:
+                _tell_start(start, frame)
             outputs.add(frame, result, known)
             seconds, count = seconds + spent, count + 1
             overlaps += [] if known is None else [_overlap(result, known)]
@@ -122,7 +131,15 @@ def _run(tracker: LMSCOTracker, images: Source, start: BoundingBox,
     say(f'{count} frames, {count / seconds:.1f} frames/s in the tracker')
     if overlaps:
         say(f'mean overlap {sum(overlaps) / len(overlaps):.3f} over {len(overlaps)} frames')
-    say(f'boxes.csv, overlay.mp4 and summary.png are in {folder}')
+
+
+def _tell_start(start: BoundingBox, frame: Frame) -> None:
+    """Say when a part of the target cannot be seen."""
+    height, width = frame.image.shape[:2]
+    x, y, across, down = start.as_tuple()
+    if min(x, y) < 0 or x + across > width or y + down > height:
+        warn(f'the start box {x:g},{y:g},{across:g},{down:g} reaches beyond the image of '
+             f'{width} x {height} pixels; only the part inside is seen')
 
 
 def _results(tracker: LMSCOTracker, frames: Iterator[Frame], start: BoundingBox,

@@ -45,14 +45,15 @@ def list_weights(directory: DirectoryOption = None) -> None:
     from lmsco_ros.core.weights.registry import WEIGHTS
     from lmsco_ros.core.weights.store import locate, weights_directory
 
-    rows = []
-    for source in WEIGHTS:
-        path = locate(source, directory)
-        state = ('missing' if path is None else
-                 'comes with the package' if source.bundled else path.name)
-        rows.append((source.name, state, source.license, source.purpose))
-    show_table(('name', 'here', 'license', 'purpose'), rows)
-    say(f'folder: {weights_directory(directory)}')
+    with plain_errors():
+        rows = []
+        for source in WEIGHTS:
+            path = locate(source, directory)
+            state = ('missing' if path is None else
+                     'comes with the package' if source.bundled else path.name)
+            rows.append((source.name, state, source.license, source.purpose))
+        show_table(('name', 'here', 'license', 'purpose'), rows)
+        say(f'folder: {weights_directory(directory)}')
 
 
 def fetch(

@@ -18,6 +18,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from itertools import islice
 import time
 
 from sensor_msgs.msg import CompressedImage, Image
@@ -124,9 +125,10 @@ class Player:
             last = self._pending[-1]
             self._wait(lambda: last not in self._pending)
 
-    def exchanges(self) -> list[Exchange]:
-        """Return all frames in the order sent."""
-        return [self._exchange(stamp, sent) for stamp, sent in self._sent.items()]
+    def exchanges(self, start: int = 0) -> list[Exchange]:
+        """Return all frames in the order sent, from number `start` on."""
+        return [self._exchange(stamp, sent)
+                for stamp, sent in islice(self._sent.items(), start, None)]
 
     def _wait(self, is_done: Callable[[], bool]) -> None:
         while not is_done():

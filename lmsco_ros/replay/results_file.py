@@ -17,6 +17,7 @@
 from __future__ import annotations
 
 import csv
+import io
 from pathlib import Path
 from types import TracebackType
 
@@ -30,19 +31,32 @@ class BoxesFile:
     One row a frame; use as a context manager.
 
     While the target is lost the row has no box, so that nobody takes the last trusted
-    one for a measurement.
+    one for a measurement. A row is in the file, and whole, once `add` returns: neither a
+    process that is killed nor a full disk leaves half of one.
 
     Parameters
     ----------
     path : Path
-        File to write.
+        File to write; it must not exist.
+
+    Raises
+    ------
+    OSError
+        From here, `add` and the end of the block: names the file that cannot be written.
 
     """
 
     def __init__(self, path: Path) -> None:
-        self._stream = path.open('w', newline='', encoding='utf-8')
-        self._writer = csv.writer(self._stream, lineterminator='\n')
-        self._writer.writerow(COLUMNS)
+        self._path = path
+        self._stream = path.open('xb', buffering=0)
+        self._size = 0
+        self.rows = 0
+        try:
+            self._append(COLUMNS)
+        except OSError:
+            self._stream.close()
+            path.unlink()
+            raise
 
     def __enter__(self) -> BoxesFile:
         """Return the open file."""
@@ -51,7 +65,10 @@ class BoxesFile:
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None,
                  trace: TracebackType | None) -> None:
         """Close the file."""
-        self._stream.close()
+        try:
+            self._stream.close()
+        except OSError as late:
+            raise OSError(late.errno, late.strerror, str(self._path)) from late
 
     def add(self, index: int, stamp_ns: int, result: TrackResult) -> None:
         """Write the row of frame `index`; stamps are written in seconds."""
@@ -59,5 +76,19 @@ class BoxesFile:
         box = [''] * 4
         if result.state is not TrackState.LOST:
             box = [f'{value:.3f}' for value in result.box.as_tuple()]
-        self._writer.writerow([index, f'{seconds}.{nanoseconds:09d}', *box,
-                               f'{result.score:.4f}', result.state.value])
+        self._append([index, f'{seconds}.{nanoseconds:09d}', *box,
+                      f'{result.score:.4f}', result.state.value])
+        self.rows += 1
+
+    def _append(self, values: list[object] | tuple[str, ...]) -> None:
+        """Write a row, or nothing of it."""
+        text = io.StringIO()
+        csv.writer(text, lineterminator='\n').writerow(values)
+        rest = text.getvalue().encode()
+        try:
+            while rest:
+                rest = rest[self._stream.write(rest):]
+        except OSError as error:
+            self._stream.truncate(self._size)
+            raise OSError(error.errno, error.strerror, str(self._path)) from error
+        self._size = self._stream.tell()

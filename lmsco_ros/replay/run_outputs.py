@@ -16,7 +16,9 @@
 
 from __future__ import annotations
 
-from contextlib import ExitStack
+from collections.abc import Iterator
+from contextlib import contextmanager, ExitStack, suppress
+import os
 from pathlib import Path
 from types import TracebackType
 
@@ -27,58 +29,135 @@ from lmsco_ros.replay.results_file import BoxesFile
 from lmsco_ros.visualization.contact_sheet import ContactSheet, Moment
 from lmsco_ros.visualization.overlay_video import OverlayVideo
 
+TABLE, FILM, SUMMARY = 'boxes.csv', 'overlay.mp4', 'summary.png'
+
 
 class RunOutputs:
     """
-    The folder of one run; use as a context manager.
+    The results of one run in a folder; use as a context manager.
+
+    Nothing is written before the first frame: a run that is refused leaves the folder as it
+    was. What was tracked before an error is kept.
 
     Parameters
     ----------
     folder : Path
-        Where to write; created when missing, earlier results are replaced.
+        Where to write; created when missing. Other files in it are left alone.
     fps : float
         Speed of the film.
     title : str
         Headline of the summary.
+    overwrite : bool
+        Whether the first frame replaces the results of an earlier run.
 
     Raises
     ------
     OutputError
-        When the folder cannot be written to.
+        When the folder holds results that are not to be replaced; later, when a file cannot
+        be written. Names the file.
 
     """
 
-    def __init__(self, folder: Path, fps: float, title: str) -> None:
+    def __init__(self, folder: Path, fps: float, title: str, *, overwrite: bool = False) -> None:
         self._folder = folder
+        self._fps = fps
         self._title = title
+        self._overwrite = overwrite
         self._open = ExitStack()
         self._sheet = ContactSheet()
-        self._is_empty = True
-        try:
-            folder.mkdir(parents=True, exist_ok=True)
-            self._boxes = self._open.enter_context(BoxesFile(folder / 'boxes.csv'))
-        except OSError as error:
-            raise OutputError(f'{folder} cannot be written to ({error}); '
-                              'choose another output folder') from error
-        self._video = self._open.enter_context(OverlayVideo(folder / 'overlay.mp4', fps))
+        self._boxes: BoxesFile | None = None
+        self._video: OverlayVideo | None = None
+        self._shown = 0
+        if not overwrite:
+            self._require_none()
 
     def __enter__(self) -> RunOutputs:
-        """Return the open outputs."""
+        """Return the outputs."""
         return self
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None,
                  trace: TracebackType | None) -> None:
-        """Finish the files; what was tracked before an error is kept."""
-        self._open.close()
-        if not self._is_empty:
-            self._sheet.save(self._folder / 'summary.png', self._title)
+        """Finish the files."""
+        failed = error is not None
+        try:
+            with _told():
+                self._open.close()
+        except OutputError:
+            failed = True
+            raise
+        finally:
+            # Of a full disk the first file that suffers is told.
+            with suppress(*(OutputError,) if failed else ()):
+                self._save_summary()
+
+    @property
+    def kept(self) -> str:
+        """What has been written so far and where; empty when there is nothing."""
+        if self._boxes is None:
+            return ''
+        pictures = [name for name in (FILM, SUMMARY)
+                    if (self._folder / name).is_file() and (self._folder / name).stat().st_size]
+        files = ', '.join([f'{TABLE} with {self._boxes.rows} rows', *pictures])
+        return f'kept in {self._folder}: {files}'
 
     def add(self, frame: Frame, result: TrackResult, truth: BoundingBox | None = None) -> None:
         """Append one frame with what the tracker said and, where known, the truth."""
-        self._is_empty = False
-        self._boxes.add(frame.index, frame.stamp_ns, result)
-        try:
+        self.add_row(frame.index, frame.stamp_ns, result)
+        self.add_picture(frame, result, truth)
+
+    def add_row(self, index: int, stamp_ns: int, result: TrackResult) -> None:
+        """Append what the tracker said about one frame to the table alone."""
+        with _told():
+            if self._boxes is None:
+                self._make_room()
+                self._boxes = self._open.enter_context(BoxesFile(self._folder / TABLE))
+            self._boxes.add(index, stamp_ns, result)
+
+    def add_picture(self, frame: Frame, result: TrackResult,
+                    truth: BoundingBox | None = None) -> None:
+        """Show a frame, whose row is in the table, in film and summary."""
+        with _told():
+            if self._video is None:
+                film = OverlayVideo(self._folder / FILM, self._fps)
+                self._video = self._open.enter_context(film)
             view = self._video.add(frame.image, result, label=str(frame.index), truth=truth)
-        except OSError as error:
-            raise OutputError(str(error)) from error
         self._sheet.add(Moment(frame.index, view, result, truth))
+        self._shown += 1
+
+    def _require_none(self) -> None:
+        found = [name for name in (TABLE, FILM, SUMMARY)
+                 if os.path.lexists(self._folder / name)]
+        if found:
+            raise OutputError(f'{self._folder} has {", ".join(found)} of an earlier run; choose '
+                              'another output, or replace them with --overwrite')
+
+    def _make_room(self) -> None:
+        """Make the folder, without earlier results: those of two runs are never mixed."""
+        self._folder.mkdir(parents=True, exist_ok=True)
+        if self._overwrite:
+            for name in (TABLE, FILM, SUMMARY):
+                (self._folder / name).unlink(missing_ok=True)
+
+    def _save_summary(self) -> None:
+        if not self._shown:
+            return
+        path = self._folder / SUMMARY
+        partial = path.with_name(f'.{path.name}')
+        try:
+            with _told(path):
+                self._sheet.save(partial, self._title)
+                partial.replace(path)
+        finally:
+            partial.unlink(missing_ok=True)
+
+
+@contextmanager
+def _told(path: Path | None = None) -> Iterator[None]:
+    """Turn what the operating system says into words, about `path` where it names no file."""
+    try:
+        yield
+    except OSError as error:
+        words = error.strerror or str(error)
+        place = path or error.filename
+        raise OutputError(f'{f"{place}: " if place else ""}{words}; check the place and its free '
+                          'space, or choose another output') from error

@@ -16,7 +16,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 import time
 
@@ -28,7 +28,7 @@ from sensor_msgs.msg import Image
 from lmsco_ros.core.types import BoundingBox, TrackResult, TrackState
 from lmsco_ros.replay.headers import header_at
 from lmsco_ros.replay.node_session import Heard, NodeSession
-from lmsco_ros.replay.player import Exchange, Player
+from lmsco_ros.replay.player import Player
 from lmsco_ros.synthetic import SceneFrame
 from msg_adapters.image import image_from_message, message_from_image
 
@@ -57,57 +57,102 @@ class TrackedFrame:
     tracker_seconds: float
 
 
-def run_scene(frames: Sequence[SceneFrame], parameters: Mapping[str, object],
-              on_frame: Callable[[], None]) -> list[TrackedFrame]:
+class SceneRun:
     """
-    Publish the frames when they are due, with stamps of the present.
+    One pass of the scene through the node; what was answered outlives an interruption.
 
     Parameters
     ----------
     frames : sequence of SceneFrame
         The scene; the node starts on the truth of the first one.
-    parameters : mapping
-        Of the node.
-    on_frame : callable
+    on_sent : callable
         Called for each frame that was sent.
-
-    Returns
-    -------
-    list of TrackedFrame
-        Frames that the node dropped, because it was not done with earlier ones, are missing.
-
-    Raises
-    ------
-    NodeError
-        When the node does not start, refuses or stops answering.
+    on_answer : callable
+        Called with each frame soon after it was answered, in the order sent; the confidence
+        map may be missing still.
 
     """
-    maps: dict[int, _ConfidenceMap] = {}
 
-    def keep_map(heard: Heard, stamp: int, seconds: float) -> None:
+    def __init__(self, frames: Sequence[SceneFrame], *,
+                 on_sent: Callable[[], None] = lambda: None,
+                 on_answer: Callable[[TrackedFrame], None] = lambda frame: None) -> None:
+        self._frames = frames
+        self._on_sent = on_sent
+        self._on_answer = on_answer
+        self._maps: dict[int, _ConfidenceMap] = {}
+        self._player: Player | None = None
+        self._next, self._box = 0, frames[0].box
+
+    def play(self, parameters: Mapping[str, object]) -> None:
+        """
+        Publish the frames when they are due, with stamps of the present.
+
+        Parameters
+        ----------
+        parameters : mapping
+            Of the node.
+
+        Raises
+        ------
+        NodeError
+            When the node does not start, refuses or stops answering.
+
+        """
+        first = self._frames[0]
+        with NodeSession(parameters, outputs=('confidence_map',)) as session:
+            self._player = player = Player(session, self._keep_map)
+            origin = time.time_ns()
+            try:
+                # The scene stands still until the node has taken up the target.
+                player.start(first.box, origin + first.stamp_ns)
+                self._send(first, origin)
+                player.settle(allowed=0)
+                began = time.monotonic() - first.stamp_ns * 1e-9
+                for frame in self._frames[1:]:
+                    player.listen_until(began + frame.stamp_ns * 1e-9)
+                    self._tell()
+                    self._send(frame, origin)
+                player.finish()
+            finally:
+                self._tell()
+
+    def tracked(self) -> list[TrackedFrame]:
+        """
+        Return what was answered so far.
+
+        Frames that the node dropped, because it was not done with earlier ones, are missing.
+        """
+        return [item for _, item in self._answered(0, self._frames[0].box)]
+
+    def _send(self, frame: SceneFrame, origin: int) -> None:
+        stamp = origin + frame.stamp_ns
+        self._player.send(stamp, message_from_image(
+            frame.image, header=header_at(stamp, 'thermal_camera')))
+        self._on_sent()
+
+    def _keep_map(self, heard: Heard, stamp: int, seconds: float) -> None:
         if heard.output == 'confidence_map':
-            maps[stamp] = _read_map(heard.data)
+            self._maps[stamp] = _read_map(heard.data)
 
-    with NodeSession(parameters, outputs=('confidence_map',)) as session:
-        player = Player(session, keep_map)
-        origin = time.time_ns()
+    def _tell(self) -> None:
+        """Hand on the answers that have come since the last call."""
+        for index, item in self._answered(self._next, self._box):
+            self._next, self._box = index + 1, item.result.box
+            self._on_answer(item)
 
-        def send(frame: SceneFrame) -> None:
-            stamp = origin + frame.stamp_ns
-            player.send(stamp, message_from_image(
-                frame.image, header=header_at(stamp, 'thermal_camera')))
-            on_frame()
-
-        # The scene stands still until the node has taken up the target.
-        player.start(frames[0].box, origin + frames[0].stamp_ns)
-        send(frames[0])
-        player.settle(allowed=0)
-        began = time.monotonic() - frames[0].stamp_ns * 1e-9
-        for frame in frames[1:]:
-            player.listen_until(began + frame.stamp_ns * 1e-9)
-            send(frame)
-        player.finish()
-    return _assemble(frames, player.exchanges(), maps)
+    def _answered(self, start: int, box: BoundingBox) -> Iterator[tuple[int, TrackedFrame]]:
+        """Yield answered frames with their numbers from `start` on; `box` is the one before."""
+        exchanges = [] if self._player is None else self._player.exchanges(start)
+        for index, exchange in enumerate(exchanges, start):
+            status = exchange.answer.status
+            if exchange.latency is None or status is None:
+                continue
+            box = exchange.answer.box or box
+            confidence = self._maps.get(exchange.stamp, _ConfidenceMap(_NO_MAP, box))
+            result = TrackResult(box, status.score or 0.0, TrackState(status.state),
+                                 confidence.values, confidence.region)
+            yield index, TrackedFrame(self._frames[index], result, exchange.latency,
+                                      status.tracker_ms * 1e-3)
 
 
 @dataclass(frozen=True, eq=False)
@@ -125,20 +170,3 @@ def _read_map(data: bytes) -> _ConfidenceMap:
     top, bottom, left, right = rows[0], rows[-1] + 1, columns[0], columns[-1] + 1
     return _ConfidenceMap(image[top:bottom, left:right].copy(),
                           BoundingBox(left, top, right - left, bottom - top))
-
-
-def _assemble(frames: Sequence[SceneFrame], exchanges: Sequence[Exchange],
-              maps: Mapping[int, _ConfidenceMap]) -> list[TrackedFrame]:
-    """Put boxes, states and maps of the answered frames together."""
-    tracked, box = [], frames[0].box
-    for frame, exchange in zip(frames, exchanges):
-        status = exchange.answer.status
-        if exchange.latency is None or status is None:
-            continue
-        box = exchange.answer.box or box
-        confidence = maps.get(exchange.stamp, _ConfidenceMap(_NO_MAP, box))
-        tracked.append(TrackedFrame(
-            frame, TrackResult(box, status.score or 0.0, TrackState(status.state),
-                               confidence.values, confidence.region),
-            exchange.latency, status.tracker_ms * 1e-3))
-    return tracked
