@@ -15,6 +15,9 @@
 """The command line as a user meets it, and a scene to use it on."""
 
 from dataclasses import dataclass
+import os
+import subprocess
+import sys
 
 import cv2
 import pytest
@@ -45,6 +48,23 @@ def lmsco():
     return run
 
 
+@pytest.fixture
+def lmsco_process():
+    """Return a function that starts `lmsco` as a process, which ends with the test."""
+    started = []
+
+    def start(*arguments, **options):
+        process = subprocess.Popen(
+            [sys.executable, '-m', 'lmsco_ros.cli.main', *map(str, arguments)],
+            **{'stdout': subprocess.PIPE, 'stderr': subprocess.PIPE, 'text': True, **options})
+        started.append(process)
+        return process
+    yield start
+    for process in started:
+        process.kill()
+        process.communicate()
+
+
 @pytest.fixture(scope='session')
 def scene():
     """Return the frames of a small scene."""
@@ -58,6 +78,17 @@ def scene_folder(tmp_path_factory, scene):
     folder.mkdir()
     for frame in scene:
         cv2.imwrite(str(folder / f'{frame.index:08d}.png'), frame.image)
+    return folder
+
+
+@pytest.fixture(scope='session')
+def endless_folder(scene_folder):
+    """Return the scene with its last image over and over: more than a test waits for."""
+    folder = scene_folder.parent / 'endless'
+    folder.mkdir()
+    images = sorted(scene_folder.iterdir())
+    for index in range(20_000):
+        os.link(images[min(index, len(images) - 1)], folder / f'{index:08d}.png')
     return folder
 
 

@@ -91,6 +91,55 @@ def test_errors_are_one_clear_line(lmsco, tmp_path, scene_folder, arguments, cod
     assert 'Traceback' not in outcome.output
 
 
+def test_earlier_results_are_replaced_only_on_request(lmsco, tmp_path, scene_folder, start):
+    arguments = ('track', scene_folder, '--init', start, '--output', tmp_path, '--frames')
+    assert lmsco(*arguments, 4).exit_code == 0
+    outcome = lmsco(*arguments, 2)
+    assert outcome.exit_code == 1 and 'of an earlier run' in outcome.words
+    assert '--overwrite' in outcome.words and len(rows_of(tmp_path)) == 4
+    assert lmsco(*arguments, 2, '--overwrite').exit_code == 0
+    assert len(rows_of(tmp_path)) == 2
+
+
+@pytest.mark.parametrize('refused', ['box', 'image', 'truth'])
+def test_refused_run_leaves_earlier_results_untouched(lmsco, tmp_path, scene_folder, start,
+                                                      refused):
+    run = tmp_path / 'run'
+    assert lmsco('track', scene_folder, '--init', start, '--frames', 3,
+                 '--output', run).exit_code == 0
+    before = {path.name: path.read_bytes() for path in run.iterdir()}
+    broken = tmp_path / 'broken'
+    broken.mkdir()
+    (broken / '0.png').write_bytes((scene_folder / '00000000.png').read_bytes()[:99])
+    (tmp_path / 'truth.txt').write_text('no box\n')
+    source, *wanted = {'box': (scene_folder, '--init', '900,900,20,20'),
+                       'image': (broken, '--init', start),
+                       'truth': (scene_folder, '--ground-truth', tmp_path / 'truth.txt')}[refused]
+    outcome = lmsco('track', source, *wanted, '--output', run, '--overwrite')
+    assert outcome.exit_code == 1 and 'error:' in outcome.words
+    assert {path.name: path.read_bytes() for path in run.iterdir()} == before
+
+
+def test_refused_run_makes_no_folder(lmsco, tmp_path, scene_folder):
+    lmsco('track', scene_folder, '--init', '900,900,20,20', '--output', tmp_path / 'run')
+    assert not (tmp_path / 'run').exists()
+
+
+def test_images_are_no_place_for_results(lmsco, scene_folder, start):
+    """The summary would be an image of the next run."""
+    outcome = lmsco('track', scene_folder, '--init', start, '--output', scene_folder)
+    assert outcome.exit_code == 2 and 'is the source' in outcome.words
+
+
+@pytest.mark.parametrize('box, is_told', [
+    ('-20,0,100,100', True), ('100,40,80,40', True), ('0,100,40,60', True),
+    ('0,0,160,128', False), ('20.1,60.3,8.7,26.1', False)])
+def test_start_box_that_reaches_beyond_the_image_is_told(lmsco, tmp_path, scene_folder, box,
+                                                         is_told):
+    outcome = lmsco('track', scene_folder, '--init', box, '--frames', 1, '--output', tmp_path)
+    assert ('reaches beyond the image of 160 x 128 pixels' in outcome.words) is is_told
+
+
 def test_missing_source(lmsco, tmp_path):
     outcome = lmsco('track', tmp_path / 'nothing', '--init', '1,2,3,4')
     assert outcome.exit_code == 2 and 'does not exist' in outcome.words

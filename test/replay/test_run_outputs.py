@@ -15,8 +15,11 @@
 """The folder of a run holds table, film and summary."""
 
 import csv
+import errno
+from unittest.mock import Mock
 
 import cv2
+from hypothesis import given, strategies as st
 import numpy as np
 import pytest
 
@@ -24,6 +27,7 @@ from lmsco_ros.core.types import BoundingBox, TrackResult, TrackState
 from lmsco_ros.replay.errors import OutputError
 from lmsco_ros.replay.results_file import BoxesFile
 from lmsco_ros.replay.run_outputs import RunOutputs
+from lmsco_ros.visualization.contact_sheet import ContactSheet
 
 
 def result(state=TrackState.TRACKING):
@@ -62,7 +66,109 @@ def test_what_was_tracked_before_an_error_is_kept(tmp_path, frames):
     assert (tmp_path / 'run' / 'summary.png').stat().st_size > 1000
 
 
-def test_place_that_cannot_be_written_to(tmp_path):
+def test_place_that_cannot_be_written_to(tmp_path, frames):
     (tmp_path / 'file').write_text('')
-    with pytest.raises(OutputError, match='cannot be written to'):
-        RunOutputs(tmp_path / 'file' / 'run', 25, 'a run')
+    with pytest.raises(OutputError, match='run: Not a directory; check the place'):
+        with RunOutputs(tmp_path / 'file' / 'run', 25, 'a run') as outputs:
+            outputs.add(frames[0], result())
+
+
+def test_every_row_is_whole_in_the_file_at_once(tmp_path):
+    path = tmp_path / 'boxes.csv'
+    with BoxesFile(path) as file:
+        for index in range(3):
+            file.add(index, 0, result())
+            assert path.read_bytes().count(b'\n') == index + 2 and path.read_bytes()[-1:] == b'\n'
+
+
+class FullDisk:
+    """A file for which the disk has room for some bytes only, and writes as much as it can."""
+
+    def __init__(self, stream, room):
+        self._stream, self._room = stream, room
+
+    def write(self, data):
+        if not self._room:
+            raise OSError(errno.ENOSPC, 'No space left on device')
+        written = self._stream.write(data[:self._room])
+        self._room -= written
+        return written
+
+    def __getattr__(self, name):
+        return getattr(self._stream, name)
+
+
+@given(room=st.integers(0, 300))
+def test_full_disk_leaves_no_half_of_a_row(tmp_path_factory, room):
+    path = tmp_path_factory.mktemp('disk') / 'boxes.csv'
+    with BoxesFile(path) as file:
+        file._stream = FullDisk(file._stream, room)
+        with pytest.raises(OSError) as full:
+            for index in range(100):
+                file.add(index, 0, result())
+    assert full.value.filename == str(path)
+    heading, *rows = path.read_text().splitlines(keepends=True)
+    assert len(rows) == file.rows and all(row.endswith(',tracking\n') for row in rows)
+    assert sum(map(len, rows)) <= room
+
+
+def test_full_disk_names_the_file_that_suffered_first(tmp_path, frames, monkeypatch):
+    """The summary finds no room either, which is no news then."""
+    outputs = RunOutputs(tmp_path, 25, 'a run')
+    full = OSError(errno.ENOSPC, 'No space left on device', str(tmp_path / 'boxes.csv'))
+    with pytest.raises(OutputError, match='boxes.csv: No space left on device'):
+        with outputs:
+            outputs.add(frames[0], result())
+            monkeypatch.setattr(BoxesFile, '_append', Mock(side_effect=full))
+            monkeypatch.setattr(ContactSheet, 'save', Mock(side_effect=full))
+            outputs.add(frames[1], result())
+    assert outputs.kept == f'kept in {tmp_path}: boxes.csv with 1 rows, overlay.mp4'
+
+
+def test_summary_that_finds_no_room_is_told_and_leaves_nothing(tmp_path, frames, monkeypatch):
+    def save(sheet, path, title):
+        path.write_bytes(b'half')
+        raise OSError(errno.ENOSPC, 'No space left on device')
+    monkeypatch.setattr(ContactSheet, 'save', save)
+    with pytest.raises(OutputError, match='summary.png: No space left on device'):
+        with RunOutputs(tmp_path, 25, 'a run') as outputs:
+            outputs.add(frames[0], result())
+    assert {path.name for path in tmp_path.iterdir()} == {'boxes.csv', 'overlay.mp4'}
+
+
+def earlier_results(folder):
+    folder.mkdir(exist_ok=True)
+    for name in ('boxes.csv', 'overlay.mp4', 'summary.png'):
+        (folder / name).write_text('earlier')
+    (folder / 'notes.txt').write_text('mine')
+    return folder
+
+
+def contents(folder):
+    return {path.name: path.read_bytes() for path in folder.iterdir()}
+
+
+@pytest.mark.parametrize('name', ['boxes.csv', 'overlay.mp4', 'summary.png'])
+def test_results_of_an_earlier_run_are_refused(tmp_path, name):
+    (tmp_path / name).write_text('earlier')
+    with pytest.raises(OutputError, match=f'has {name} of an earlier run.*--overwrite'):
+        RunOutputs(tmp_path, 25, 'a run')
+    assert contents(tmp_path) == {name: b'earlier'}
+
+
+def test_run_without_a_frame_leaves_earlier_results_untouched(tmp_path):
+    before = contents(earlier_results(tmp_path))
+    with RunOutputs(tmp_path, 25, 'a run', overwrite=True) as outputs:
+        assert not outputs.kept
+    assert contents(tmp_path) == before
+
+
+def test_earlier_results_are_replaced_on_request_and_nothing_else(tmp_path, frames):
+    earlier_results(tmp_path)
+    with RunOutputs(tmp_path, 25, 'a run', overwrite=True) as outputs:
+        outputs.add_row(0, 0, result())
+        assert set(contents(tmp_path)) == {'boxes.csv', 'notes.txt'}
+        outputs.add_picture(frames[0], result())
+    after = contents(tmp_path)
+    assert after.pop('notes.txt') == b'mine' and len(after) == 3
+    assert b'earlier' not in after.values()
