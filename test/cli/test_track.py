@@ -74,9 +74,28 @@ def test_configuration_file(lmsco, tmp_path, scene_folder, start):
     assert outcome.exit_code == 0, outcome.output
 
 
+@pytest.mark.parametrize('text, words', [
+    ('learning:\n\titerations: 1\n', 'line 2, column 1'), ('features: &all [*all]\n', 'levels deep'),
+    ('sampling: {newton_steps: many}', "newton_steps is 'many'; expected a int")])
+def test_configuration_that_is_none_is_named(lmsco, tmp_path, scene_folder, start, text, words):
+    (tmp_path / 'mine.yaml').write_text(text)
+    outcome = lmsco('track', scene_folder, '--init', start, '--output', tmp_path / 'run',
+                    '--config', tmp_path / 'mine.yaml')
+    assert outcome.exit_code == 2 and not (tmp_path / 'run').exists()
+    assert words in outcome.words and 'mine.yaml' in outcome.words
+    assert len(outcome.output.splitlines()) == 1
+
+
 @pytest.mark.parametrize('arguments, code, words', [
     (('--init', '1,2,3'), 2, 'four numbers'),
     (('--init', '1,2,nan,4'), 2, 'four numbers'),
+    (('--init', ''), 2, 'four numbers'),
+    (('--init', '1;2;3;4'), 2, 'four numbers'),
+    (('--init', '1e999,0,5,5'), 2, 'four numbers'),
+    (('--init', '-300,-300,20,20'), 1, '-300'),
+    (('--init', '1e300,1e300,1e300,1e300'), 1, '1e+300'),
+    (('--init', '1e-300,0,1e-300,1e-300'), 1, '1e-300'),
+    (('--init', '10,10,20,20', '--config', '.'), 2, 'is a directory'),
     (('--init', '1,2,0,4'), 2, 'must be positive'),
     ((), 2, 'no target; give --init'),
     (('--init', '10,10,20,20', '--preset', 'nope'), 2, 'nope'),

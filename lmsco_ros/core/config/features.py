@@ -18,7 +18,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from lmsco_ros.core.config.validation import check_choice, check_range
+from lmsco_ros.core.config.validation import check_choice, check_range, shown
 from lmsco_ros.core.errors import ConfigError
 
 __all__ = ['ChannelConfig', 'FeatureConfig', 'MotionConfig', 'NETWORK_KINDS', 'NetworkConfig']
@@ -59,8 +59,8 @@ class ChannelConfig:
         check_range(self, 'weight', 0, 100, open_low=True)
         check_range(self, 'power', 0, 1)
         if bool(self.layer) != (self.kind in NETWORK_KINDS):
-            raise ConfigError(f'ChannelConfig.layer is {self.layer!r} for kind {self.kind!r}; '
-                              f'expected a layer such as shallow or deep for '
+            raise ConfigError(f'ChannelConfig.layer is {shown(self.layer)} for kind '
+                              f'{self.kind!r}; expected a layer such as shallow or deep for '
                               f'{" and ".join(NETWORK_KINDS)}, none for the others')
 
 

@@ -32,7 +32,8 @@ from lmsco_ros.core.config.presence import ComparisonConfig, PresenceConfig
 from lmsco_ros.core.config.presets import HANDCRAFTED, PRESETS
 from lmsco_ros.core.config.runtime import RuntimeConfig
 from lmsco_ros.core.config.search import SearchConfig
-from lmsco_ros.core.config.validation import build
+from lmsco_ros.core.config.validation import build, shown
+from lmsco_ros.core.config.yaml_file import read_mapping
 from lmsco_ros.core.errors import ConfigError
 
 __all__ = ['TrackerConfig']
@@ -97,7 +98,8 @@ class TrackerConfig:
         try:
             return cls(**PRESETS[name])
         except (KeyError, TypeError):
-            raise ConfigError(f'unknown preset {name!r}; expected one of '
+            # Callers and files may have something else in the place of a name.
+            raise ConfigError(f'unknown preset {shown(name)}; expected one of '
                               f'{", ".join(PRESETS)}; TrackerConfig.from_yaml reads a file'
                               ) from None
 
@@ -120,15 +122,20 @@ class TrackerConfig:
 
     @classmethod
     def from_yaml(cls, path: str | Path) -> TrackerConfig:
-        """Return the configuration in a YAML file, as `from_dict` reads it."""
+        """
+        Return the configuration in a YAML file, as `from_dict` reads it.
+
+        Raises
+        ------
+        ConfigError
+            As `read_mapping` and `from_dict`; names the file.
+
+        """
+        data = read_mapping(path)
         try:
-            data = yaml.safe_load(Path(path).read_text(encoding='utf-8'))
-        except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
-            raise ConfigError(f'cannot read the configuration {path}: {error}; '
-                              'expected a readable YAML file') from error
-        if not isinstance(data or {}, Mapping):
-            raise ConfigError(f'{path} holds {type(data).__name__}; expected keys and values')
-        return cls.from_dict(data or {})
+            return cls.from_dict(data)
+        except ConfigError as error:
+            raise ConfigError(f'{path}: {error}') from error
 
     def to_dict(self) -> dict[str, Any]:
         """Return nested plain values that `from_dict` turns into the same configuration."""

@@ -17,16 +17,22 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from contextlib import suppress
 import dataclasses
 import difflib
 import math
+import reprlib
 import types
 import typing
 from typing import Any
 
 from lmsco_ros.core.errors import ConfigError
 
-__all__ = ['build', 'check_choice', 'check_range']
+__all__ = ['build', 'check_choice', 'check_range', 'shown']
+
+# What a message shows of a text, and the length from which a number is not shown at all.
+_LONGEST = 80
+_DIGITS = 40
 
 
 def check_range(owner: object, name: str, low: float, high: float, *,
@@ -47,9 +53,11 @@ def check_range(owner: object, name: str, low: float, high: float, *,
 
     """
     value = getattr(owner, name)
-    if not math.isfinite(value) or value > high or value < low or (open_low and value == low):
+    # Whole numbers may be too large for what asks whether they are finite.
+    if not -math.inf < value < math.inf or not low <= value <= high or (
+            open_low and value == low):
         bracket = '(' if open_low else '['
-        raise ConfigError(f'{type(owner).__name__}.{name} is {value}; '
+        raise ConfigError(f'{type(owner).__name__}.{name} is {shown(value)}; '
                           f'expected a value in {bracket}{low}, {high}]')
 
 
@@ -57,7 +65,7 @@ def check_choice(owner: object, name: str, choices: tuple[str, ...]) -> None:
     """Raise ConfigError unless owner.name is one of `choices`."""
     value = getattr(owner, name)
     if value not in choices:
-        raise ConfigError(f'{type(owner).__name__}.{name} is {value!r}; '
+        raise ConfigError(f'{type(owner).__name__}.{name} is {shown(value)}; '
                           f'expected one of {", ".join(choices)}')
 
 
@@ -81,14 +89,15 @@ def build(kind: type, data: Any, where: str = '') -> Any:
 
     """
     if not isinstance(data, Mapping):
-        raise ConfigError(f'{where or "the configuration"} is {data!r}; expected keys and values: '
-                          f'{", ".join(f.name for f in dataclasses.fields(kind))}')
+        raise ConfigError(f'{where or "the configuration"} is {shown(data)}; expected keys and '
+                          f'values: {", ".join(f.name for f in dataclasses.fields(kind))}')
     hints = typing.get_type_hints(kind)
     known = [field.name for field in dataclasses.fields(kind)]
     for key in data:
         if key not in known:
-            near = difflib.get_close_matches(str(key), known, n=1, cutoff=0.0)
-            raise ConfigError(f'unknown key {_join(where, str(key))!r}; did you mean '
+            name = key[:_LONGEST] if isinstance(key, str) else shown(key)
+            near = difflib.get_close_matches(name, known, n=1, cutoff=0.0)
+            raise ConfigError(f'unknown key {_join(where, name)!r}; did you mean '
                               f'{near[0]!r}? Known keys: {", ".join(known)}')
     return kind(**{key: _convert(hints[key], value, _join(where, key))
                    for key, value in data.items()})
@@ -105,7 +114,7 @@ def _convert(hint: Any, value: Any, where: str) -> Any:
         return build(typing.cast(type, hint), value, where)
     if typing.get_origin(hint) is tuple:
         if isinstance(value, str) or not isinstance(value, (list, tuple)):
-            raise ConfigError(f'{where} is {value!r}; expected a list')
+            raise ConfigError(f'{where} is {shown(value)}; expected a list')
         item = typing.get_args(hint)[0]
         return tuple(_convert(item, v, f'{where}[{i}]') for i, v in enumerate(value))
     if typing.get_origin(hint) in (typing.Union, types.UnionType):
@@ -114,9 +123,21 @@ def _convert(hint: Any, value: Any, where: str) -> Any:
         hint = typing.get_args(hint)[0]
     number = isinstance(value, (int, float)) and not isinstance(value, bool)
     if hint is float and number:
-        return float(value)
-    if hint is int and number and float(value).is_integer():
+        # Whole numbers may be larger than any float.
+        with suppress(OverflowError):
+            return float(value)
+    if hint is int and number and (isinstance(value, int) or value.is_integer()):
         return int(value)
     if hint in (bool, str) and isinstance(value, hint):
         return value
-    raise ConfigError(f'{where} is {value!r}; expected a {hint.__name__}')
+    raise ConfigError(f'{where} is {shown(value)}; expected a {hint.__name__}')
+
+
+def shown(value: object) -> str:
+    """Return what a message shows of a value of any size, which may hold itself."""
+    if isinstance(value, int) and abs(value) >= 10 ** (_DIGITS - 1):
+        return f'a number with {_DIGITS} digits or more'
+    brief = reprlib.Repr()
+    brief.maxstring = brief.maxother = _LONGEST
+    brief.maxlevel = 3
+    return brief.repr(value)

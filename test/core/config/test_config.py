@@ -288,23 +288,122 @@ def test_features_are_checked(block, reason):
         TrackerConfig.from_dict({'features': [block]})
 
 
+def nested_merges(levels):
+    """Return a text whose merged keys are nine times as many on every level."""
+    lines = ['a0: &a0 {k: 1}']
+    lines += [f'a{i}: &a{i} {{<<: [{", ".join([f"*a{i - 1}"] * 9)}]}}' for i in range(1, levels)]
+    return '\n'.join(lines)
+
+
+def nested_aliases(levels):
+    """Return a text that stands for 9 ** levels values."""
+    lines = ['a0: &a0 [1]'] + [
+        f'a{i}: &a{i} [{", ".join([f"*a{i - 1}"] * 9)}]' for i in range(1, levels)]
+    return '\n'.join(lines)
+
+
 @pytest.mark.parametrize('text, reason', [
-    ('- 1\n- 2\n', 'holds list; expected keys and values'),
-    ('a: [1,\n', '(?s)cannot read the configuration .*expected a readable YAML file'),
-    ('just words\n', 'holds str; expected keys and values'),
-    ('learning: {loss: best}\n', "loss is 'best'; expected one of"),
+    ('- 1\n- 2\n', 'it holds a list'),
+    ('just words\n', 'it holds a str'),
+    ('a: [1,\n', "line 2, column 1: .* but found '<stream end>'"),
+    ('learning:\n\tanchor: unit\n', r'line 2, column 1: .*cannot start any token'),
+    ('newton_steps: 1\n---\nnewton_steps: 2\n', 'line 2, column 1: but found another document'),
+    ('newton_steps: 1\nnewton_steps: 2\n', "line 2: the key 'newton_steps' is there twice"),
+    ('scale: {step: 1.02, step: 1.03}\n', "line 1: the key 'step' is there twice"),
+    ('features: ' + '[' * 5000 + ']' * 5000, 'nested too deeply'),
+    ('features: ' + '[' * 50 + ']' * 50, 'nested more than 20 levels deep'),
+    ('features: &all [*all]\n', 'nested more than 20 levels deep'),
+    ('scale: &all {step: *all}\n', 'nested more than 20 levels deep'),
+    ('&all\n<<: *all\n', 'nested more than 20 levels deep'),
+    (nested_aliases(12), 'more than 10000 values'),
+    (nested_merges(8), 'more than 10000 values'),
+    ('features: [' + '1, ' * 11_000 + ']', 'more than 10000 values'),
+    ('newton_steps: ' + '9' * 5000, r'Exceeds the limit \(4300 digits\)'),
+    ('newton_steps: 2024-13-45', 'month must be in'),
+    ('newton_steps: *unknown', "found undefined alias 'unknown'"),
+    ('newton_steps: !!python/object/apply:os.getpid []', 'could not determine a constructor'),
+    ('newton_steps: 5\0', 'special characters are not allowed'),
+    ('#' + 'x' * 200_000, 'more than 100000 bytes'),
+    ('words: caf\udce9', 'it is not text in UTF-8 .character 10: '),
 ])
-def test_broken_files_are_named(tmp_path, text, reason):
-    (tmp_path / 'broken.yaml').write_text(text)
-    with pytest.raises(ConfigError, match=reason):
-        TrackerConfig.from_yaml(tmp_path / 'broken.yaml')
+def test_file_that_is_no_configuration_is_refused_in_one_line(tmp_path, text, reason):
+    path = tmp_path / 'broken.yaml'
+    path.write_bytes(text.encode('utf-8', 'surrogateescape'))
+    with pytest.raises(ConfigError, match=reason) as refusal:
+        TrackerConfig.from_yaml(path)
+    message = str(refusal.value)
+    assert message.startswith(f'cannot read the configuration {path}: ')
+    assert message.endswith('; expected a YAML file with keys and values')
+    assert '\n' not in message and len(message) < 500
 
 
-def test_missing_and_binary_files_are_named(tmp_path):
-    (tmp_path / 'binary.yaml').write_bytes(b'\xff\xfe\x00\x81')
-    for name in ('missing.yaml', 'binary.yaml'):
-        with pytest.raises(ConfigError, match=f'cannot read the configuration .*{name}'):
-            TrackerConfig.from_yaml(tmp_path / name)
+@pytest.mark.parametrize('name, reason', [
+    ('missing.yaml', 'No such file or directory'), ('.', 'Is a directory'),
+    ('missing\0.yaml', 'embedded null byte'), ('\udfff\ud800', 'surrogates not allowed')])
+def test_place_without_a_file_is_named(tmp_path, name, reason):
+    with pytest.raises(ConfigError, match=f'cannot read the configuration .*{reason}'):
+        TrackerConfig.from_yaml(str(tmp_path / name))
+
+
+@pytest.mark.parametrize('text, reason', [
+    ('learning: {loss: best}\n', "loss is 'best'; expected one of"),
+    ('sampling: {newton_steps: ' + '9' * 400 + '}', 'newton_steps is a number with 40 digits or more'),
+    ('sampling: {newton_steps: 0x' + 'f' * 5000 + '}', 'newton_steps is a number with 40 digits or more'),
+    ('scale: {step: ' + '9' * 400 + '}', 'scale.step is a number with 40 digits or more'),
+    ('sampling: {newton_steps: .inf}', 'newton_steps is inf'),
+    ('sampling: {newton_steps: 1e999}', 'newton_steps is'),
+    ('preset: [default]', "unknown preset .'default'.; expected one of default"),
+    ('features: ' + 'x' * 10_000, "features is 'xxx.*[.][.][.].*xxx'; expected a list"),
+    ('x' * 1000 + ': 1', 'unknown key .xxx'),
+    ('? ' + '9' * 4000 + '\n: 1', 'unknown key .a number with 40 digits or more'),
+])
+def test_wrong_value_is_named_with_its_file_in_one_line(tmp_path, text, reason):
+    path = tmp_path / 'wrong.yaml'
+    path.write_text(text)
+    with pytest.raises(ConfigError, match=reason) as refusal:
+        TrackerConfig.from_yaml(path)
+    message = str(refusal.value)
+    assert message.startswith(f'{path}: ') and '\n' not in message and len(message) < 700
+
+
+@pytest.mark.parametrize('encoding', ['utf-8', 'utf-8-sig', 'utf-16'])
+def test_encodings_that_yaml_knows_are_read(tmp_path, encoding):
+    (tmp_path / 'c.yaml').write_bytes('# Größe\nsampling: {newton_steps: 3}\n'.encode(encoding))
+    assert TrackerConfig.from_yaml(tmp_path / 'c.yaml').sampling.newton_steps == 3
+
+
+def test_values_may_be_written_once_and_used_twice(tmp_path):
+    (tmp_path / 'c.yaml').write_text('sampling: {patch_size_min: &size 96, patch_size_max: *size}')
+    sampling = TrackerConfig.from_yaml(tmp_path / 'c.yaml').sampling
+    assert sampling.patch_size_min == sampling.patch_size_max == 96
+
+
+@given(st.one_of(st.binary(max_size=200), st.text(max_size=200).map(str.encode),
+                 st.text(alphabet='&*a<:{}[],-\n ?!|>\'"#%@`0x.', max_size=80).map(str.encode)))
+def test_any_bytes_are_a_configuration_or_refused(tmp_path_factory, content):
+    path = tmp_path_factory.mktemp('any') / 'c.yaml'
+    path.write_bytes(content)
+    try:
+        TrackerConfig.from_yaml(path)
+    except ConfigError as error:
+        assert str(path) in str(error) and '\n' not in str(error)
+
+
+_KEYS = [(section, key) for section, value in TrackerConfig().to_dict().items()
+         for key in (value if isinstance(value, dict) else [None])]
+
+
+@given(st.sampled_from(_KEYS), st.recursive(
+    st.none() | st.booleans() | st.integers() | st.floats() | st.text(max_size=9)
+    | st.just(10 ** 400) | st.dates(),
+    lambda inner: st.lists(inner, max_size=3) | st.dictionaries(st.text(max_size=5), inner,
+                                                                max_size=3), max_leaves=6))
+def test_any_value_of_a_key_is_taken_or_refused(place, value):
+    section, key = place
+    try:
+        TrackerConfig.from_dict({section: value if key is None else {key: value}})
+    except ConfigError as error:
+        assert '\n' not in str(error)
 
 
 def test_configurations_do_not_change():
