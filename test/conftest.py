@@ -115,7 +115,7 @@ class FileServer:
         self._thread.start()
 
     def url(self, name):
-        """Return the address of the file; the name `missing` is not there."""
+        """Return the address of the file; `missing` is not there, `circle` leads to itself."""
         return f'http://127.0.0.1:{self._server.server_port}/{name}'
 
     def answer(self, request):
@@ -127,6 +127,11 @@ class FileServer:
             start = 0
         if request.path == '/missing':
             request.send_error(404)
+        elif request.path == '/circle':
+            request.send_response(302)
+            request.send_header('Location', '/circle')
+            request.send_header('Content-Length', '0')
+            request.end_headers()
         elif start and start >= len(self.content):
             request.send_error(416)
         else:

@@ -92,6 +92,28 @@ def test_wrong_bytes_are_refused(lmsco, served, folder):
     assert list(folder.iterdir()) == []
 
 
+@pytest.mark.parametrize('path', ['missing', 'circle', 'page'])
+def test_what_cannot_be_fetched_is_told_in_one_line(lmsco, served, monkeypatch, path):
+    served.content = b'<html>Log in</html>'
+    url = served.url(path)
+    monkeypatch.setattr(registry, 'WEIGHTS', tuple(
+        replace(source, url=url) if source.name == NAME else source
+        for source in registry.WEIGHTS))
+    outcome = lmsco('weights', 'fetch', NAME)
+    assert outcome.exit_code == 1
+    line = outcome.output.splitlines()[-1]
+    assert line.startswith(f'error: {url} ')
+    assert line.endswith(f'or get the file by other means and run '
+                         f'`lmsco weights import FILE --as {NAME}`')
+
+
+def test_folder_that_cannot_be_made_is_named(lmsco, served, tmp_path):
+    (tmp_path / 'file').write_text('')
+    outcome = lmsco('weights', 'fetch', NAME, '--directory', tmp_path / 'file' / 'inner')
+    assert outcome.exit_code == 1
+    assert outcome.output.splitlines()[-1] == f'error: {tmp_path}/file/inner: Not a directory'
+
+
 @pytest.mark.parametrize('arguments, words', [
     (('verify', 'vgg_m_2048'), 'lmsco weights fetch vgg_m_2048'),
     (('verify', 'nothing'), 'there are no weights called'),

@@ -24,6 +24,7 @@ import re
 
 import requests
 from requests.adapters import HTTPAdapter
+from urllib3.exceptions import NewConnectionError, ReadTimeoutError
 from urllib3.util import Retry
 
 from lmsco_ros.core.errors import WeightsError
@@ -36,6 +37,7 @@ Progress = Callable[[int, int | None], None]
 _CHUNK_BYTES = 1 << 16
 _TIMEOUT_SECONDS = (10.0, 60.0)
 _FRUITLESS_TRIES = 3
+_PAGE_BEGINS = (b'<!doctype html', b'<html')
 
 
 def download(url: str, path: Path, sha256: str | None = None,
@@ -65,8 +67,9 @@ def download(url: str, path: Path, sha256: str | None = None,
     Raises
     ------
     WeightsError
-        When the server cannot be reached or has no such file, when the connection breaks again
-        and again without bringing anything, or when the checksum is another.
+        When the server cannot be reached, has no such file or sends a page in its place, when
+        the connection breaks again and again without bringing anything, when there is no room
+        for the file, or when the checksum is another. Names the address.
 
     """
     path.parent.mkdir(parents=True, exist_ok=True)
@@ -83,9 +86,9 @@ def download(url: str, path: Path, sha256: str | None = None,
             except requests.RequestException as error:
                 fruitless = 0 if partial.size > most else fruitless + 1
                 most = max(most, partial.size)
-                if fruitless == _FRUITLESS_TRIES:
-                    raise WeightsError(f'{url} could not be downloaded ({error}); try again '
-                                       'later, what has arrived is kept') from error
+                if fruitless == _FRUITLESS_TRIES or _is_final(error):
+                    raise WeightsError(f'{url} could not be downloaded: {_reason(error)}; try '
+                                       'again later, what has arrived is kept') from error
     return partial.finish(sha256, url)
 
 
@@ -132,6 +135,16 @@ class _PartialFile:
         else:
             self._version.unlink(missing_ok=True)
 
+    def append(self, data: bytes) -> None:
+        """Add what has arrived, or as much of it as there is room for."""
+        try:
+            with self.path.open('ab', buffering=0) as file:
+                while data:
+                    data = data[file.write(data):]
+        except OSError as error:
+            raise WeightsError(f'{self.path}: {error.strerror}; make room and try again, what '
+                               'has arrived is kept') from error
+
     def drop(self) -> None:
         """Remove all traces."""
         self.path.unlink(missing_ok=True)
@@ -167,12 +180,14 @@ def _receive(session: requests.Session, url: str, partial: _PartialFile,
             partial.begin(_version(response))
         rest = response.headers.get('Content-Length')
         total = partial.size + int(rest) if rest and rest.isdigit() else None
-        with partial.path.open('ab') as file:
-            done = partial.size
-            for chunk in response.iter_content(_CHUNK_BYTES):
-                file.write(chunk)
-                done += len(chunk)
-                progress(done, total)
+        done = partial.size
+        for chunk in response.iter_content(_CHUNK_BYTES):
+            if not done and chunk.lstrip()[:14].lower().startswith(_PAGE_BEGINS):
+                raise WeightsError(f'{url} answers with a web page in place of the file; look at '
+                                   'it in a browser: there may be a login, or the file has moved')
+            partial.append(chunk)
+            done += len(chunk)
+            progress(done, total)
 
 
 def _continues(response: requests.Response, size: int) -> bool:
@@ -189,3 +204,29 @@ def _version(response: requests.Response) -> str | None:
     """Return what tells this version of the file from others, or None."""
     tag = response.headers.get('ETag')
     return tag if tag and not tag.startswith('W/') else response.headers.get('Last-Modified')
+
+
+def _is_final(error: requests.RequestException) -> bool:
+    """Tell whether another try is of no use: nobody was there, tried several times already."""
+    return isinstance(error, (requests.ConnectTimeout, requests.TooManyRedirects)) or \
+        isinstance(_pool_reason(error), NewConnectionError)
+
+
+def _reason(error: requests.RequestException) -> str:
+    """Return what went wrong in a few words: those of the system where it has some."""
+    if isinstance(error, requests.Timeout) or isinstance(_pool_reason(error), ReadTimeoutError):
+        return 'there was no answer in time'
+    if isinstance(error, requests.TooManyRedirects):
+        return 'the address leads to itself again and again'
+    way = 'through the proxy: ' if isinstance(error, requests.exceptions.ProxyError) else ''
+    cause: BaseException | None = error
+    while cause is not None:
+        if isinstance(cause, OSError) and cause.strerror:
+            return way + cause.strerror
+        cause = cause.__cause__ or cause.__context__
+    return way + ' '.join(str(error).split())
+
+
+def _pool_reason(error: requests.RequestException) -> object:
+    """Return why the pool of connections gave up, or None when it was something else."""
+    return getattr(error.args[0], 'reason', None) if error.args else None

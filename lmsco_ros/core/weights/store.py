@@ -192,7 +192,11 @@ def fetch_weights(name: str, directory: Path | None = None,
         raise WeightsError(f'the weights {name} have no address to download from; {where} run '
                            f'`lmsco weights import FILE --as {name}`')
     file = weights_directory(directory) / source.file_name
-    download(source.url, file, source.sha256, progress)
+    try:
+        download(source.url, file, source.sha256, progress)
+    except WeightsError as error:
+        raise WeightsError(f'{error}; or get the file by other means and run '
+                           f'`lmsco weights import FILE --as {name}`') from error
     try:
         return import_weights(file, name, directory)
     finally:

@@ -14,7 +14,10 @@
 
 """Downloads from a server that breaks connections, ignores ranges and sends wrong bytes."""
 
+import errno
 import hashlib
+import io
+from pathlib import Path
 import socket
 
 import pytest
@@ -130,12 +133,80 @@ def test_missing_file_is_told(server, goal):
     assert len(server.asked) == 1
 
 
+def refusal(url, goal):
+    """Return what is said of a download that cannot be, which is one line with the address."""
+    with pytest.raises(WeightsError) as refused:
+        download(url, goal)
+    message = str(refused.value)
+    assert message.startswith(url) and '\n' not in message and 'object at' not in message
+    return message
+
+
 def test_nobody_there_is_told(goal):
     with socket.socket() as reserved:
         reserved.bind(('127.0.0.1', 0))
         url = f'http://127.0.0.1:{reserved.getsockname()[1]}/file'
-        with pytest.raises(WeightsError, match='could not be downloaded'):
-            download(url, goal)
+        assert 'could not be downloaded: Connection refused; try' in refusal(url, goal)
+
+
+def test_name_that_is_not_known_is_told(goal, monkeypatch):
+    """What a machine without a network says."""
+    def unknown(*arguments, **keywords):
+        raise socket.gaierror(socket.EAI_AGAIN, 'Temporary failure in name resolution')
+    monkeypatch.setenv('NO_PROXY', '*')
+    monkeypatch.setattr(socket, 'getaddrinfo', unknown)
+    message = refusal('https://weights.example/net.mat', goal)
+    assert 'could not be downloaded: Temporary failure in name resolution; try' in message
+
+
+def test_unreachable_proxy_is_told(goal, monkeypatch):
+    with socket.socket() as reserved:
+        reserved.bind(('127.0.0.1', 0))
+        monkeypatch.setenv('HTTP_PROXY', f'http://127.0.0.1:{reserved.getsockname()[1]}')
+        monkeypatch.setenv('NO_PROXY', '')
+        message = refusal('http://weights.example/net.mat', goal)
+    assert 'through the proxy: Connection refused; try' in message
+
+
+def test_silence_is_told(goal, monkeypatch):
+    monkeypatch.setattr('lmsco_ros.core.backbones.download._TIMEOUT_SECONDS', (0.2, 0.2))
+    monkeypatch.setenv('NO_PROXY', '*')
+    with socket.create_server(('127.0.0.1', 0)) as silent:
+        url = f'http://127.0.0.1:{silent.getsockname()[1]}/file'
+        assert 'could not be downloaded: there was no answer in time; try' in refusal(url, goal)
+
+
+def test_address_that_leads_to_itself_is_told(server, goal):
+    assert 'leads to itself again and again; try' in refusal(server.url('circle'), goal)
+
+
+@pytest.mark.parametrize('page', [b'<!DOCTYPE html><title>Log in</title>', b'\n <HTML lang="en">'])
+def test_page_in_place_of_the_file_is_told(server, goal, page):
+    server.content = page
+    assert 'answers with a web page in place of the file' in refusal(server.url('file'), goal)
+    assert not goal.exists()
+
+
+@pytest.mark.parametrize('address', ['nowhere', 'http://', 'gopher://host/file'])
+def test_address_that_is_none_is_told(goal, address):
+    assert 'could not be downloaded: ' in refusal(address, goal)
+
+
+def test_file_without_room_is_told_and_what_arrived_is_used(server, goal, content, monkeypatch):
+    class Full(io.FileIO):
+        def write(self, data):
+            if self.tell() >= 3 * CHUNK:
+                raise OSError(errno.ENOSPC, 'No space left on device')
+            return super().write(data)
+    opened = Path.open
+    with monkeypatch.context() as full:
+        full.setattr(Path, 'open', lambda path, mode='r', **options: (
+            Full(path, mode) if mode == 'ab' else opened(path, mode, **options)))
+        with pytest.raises(WeightsError, match=f'{goal}.part: No space left on device; make room'):
+            download(server.url('file'), goal)
+    download(server.url('file'), goal)
+    assert server.asked == [None, f'bytes={3 * CHUNK}-']
+    assert_complete(goal, content)
 
 
 def test_empty_file(server, goal):

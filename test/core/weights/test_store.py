@@ -218,7 +218,7 @@ def test_fetched_weights_are_converted(tmp_path, squeezenet, write_file, change_
 def test_fetching_a_wrong_file_keeps_what_is_here(tmp_path, squeezenet, change_source,
                                                   file_server):
     save(tmp_path, squeezenet)
-    file_server.content = b'<html>moved</html>' * 100
+    file_server.content = b'other bytes' * 100
     change_source(SQUEEZENET, url=file_server.url('net'))
     with pytest.raises(WeightsError, match='damaged, or no file of Caffe'):
         fetch_weights(SQUEEZENET, tmp_path)
