@@ -22,7 +22,8 @@ from typing import Annotated, Optional, TYPE_CHECKING
 
 import typer
 
-from lmsco_ros.cli.console import frame_progress, plain_errors, say, warn
+from lmsco_ros.cli.console import (
+    frame_progress, plain_errors, say, telling_what_is_kept, warn)
 
 if TYPE_CHECKING:
     from lmsco_ros.evaluation.runner import Evaluation
@@ -93,7 +94,9 @@ def evaluate(
             warn(f'left out: {reason}')
         selection = select_sequences(request)
         evaluation = Evaluation(trackers, selection.sequences, protocol.value, output)
-        _run(evaluation, jobs)
+        with telling_what_is_kept(lambda: f'kept in {output}: the results of all finished '
+                                          'sequences; the same command goes on from there'):
+            _run(evaluation, jobs)
         skipped = [*selection.broken, *evaluation.skipped]
         for item in skipped:
             warn(f'skipped {item.name}: {item.reason}')

@@ -111,13 +111,16 @@ class _Worker:
     def stop(self) -> None:
         """End the process whatever it does."""
         self.connection.close()
-        self._process.terminate()
+        self._process.kill()
         self._process.join()
 
 
 def _serve(connection: Connection) -> None:
     """Answer jobs until the other side hangs up."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    # Terminals and `timeout` signal the whole group; the other side decides, lest a worker that
+    # dies of it is taken for a tracker that crashed.
+    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+        signal.signal(number, signal.SIG_IGN)
     try:
         while True:
             connection.send(_run(connection.recv()))

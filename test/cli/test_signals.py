@@ -16,7 +16,9 @@
 
 import csv
 import os
+from pathlib import Path
 import pty
+import re
 import signal
 import subprocess
 import sys
@@ -176,6 +178,33 @@ def test_signal_during_the_imports_is_quiet(number, tmp_path):
     process.send_signal(number)
     assert process.communicate(timeout=PATIENCE_SECONDS)[1] == f'ended by {number.name}\n'
     assert process.returncode == 128 + number
+
+
+def ignores(process, number):
+    """Tell whether a process of this machine ignores a signal."""
+    status = Path(f'/proc/{process}/status').read_text()
+    return int(re.search(r'SigIgn:\s*(\w+)', status)[1], 16) >> (number - 1) & 1 == 1
+
+
+def test_evaluation_that_is_ended_counts_no_crash(lmsco_process, tmp_path, endless_folder, start):
+    """The signal reaches the workers as well, as from a terminal that is closed."""
+    sequence = tmp_path / 'data' / 'sequence'
+    sequence.mkdir(parents=True)
+    (sequence / 'img').symlink_to(endless_folder)
+    count = len(list(endless_folder.iterdir()))
+    (sequence / 'groundtruth_rect.txt').write_text(f'{start}\n' * count)
+    log = tmp_path / 'evaluation.log'
+    with log.open('w') as told:
+        process = lmsco_process('evaluate', tmp_path / 'data', '--tracker', 'hcs', '--output',
+                                tmp_path / 'run', stdout=told, stderr=told,
+                                start_new_session=True)
+        children = Path(f'/proc/{process.pid}/task/{process.pid}/children')
+        wait_until(lambda: any(ignores(child, signal.SIGHUP)
+                               for child in children.read_text().split()))
+        os.killpg(process.pid, signal.SIGTERM)
+        assert process.wait(PATIENCE_SECONDS) == 128 + signal.SIGTERM
+    assert 'the same command goes on from there\nended by SIGTERM\n' in log.read_text()
+    assert not list(tmp_path.glob('run/records/**/*.json'))
 
 
 def test_demo_keeps_what_was_answered(lmsco_process, tmp_path):
