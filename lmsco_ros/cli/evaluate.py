@@ -116,7 +116,9 @@ def results(
     with plain_errors():
         text = results_page(folders)
         page.parent.mkdir(parents=True, exist_ok=True)
-        page.write_text(text, encoding='utf-8')
+        partial = page.with_name(f'.{page.name}.partial')
+        partial.write_text(text, encoding='utf-8')
+        partial.replace(page)
         say(f'results: {page}')
 
 

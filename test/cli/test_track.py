@@ -17,6 +17,7 @@
 import csv
 import os
 import re
+import shutil
 import subprocess
 import sys
 
@@ -137,6 +138,26 @@ def test_refused_run_leaves_earlier_results_untouched(lmsco, tmp_path, scene_fol
     outcome = lmsco('track', source, *wanted, '--output', run, '--overwrite')
     assert outcome.exit_code == 1 and 'error:' in outcome.words
     assert {path.name: path.read_bytes() for path in run.iterdir()} == before
+
+
+def test_full_disk_is_told_with_what_is_kept(lmsco, tmp_path, endless_folder, start):
+    """A file system in memory that is made for this test, where that is allowed."""
+    disk = tmp_path / 'disk'
+    disk.mkdir()
+    if shutil.which('mount') is None or subprocess.run(
+            ['mount', '-t', 'tmpfs', '-o', 'size=300k', 'tmpfs', disk],
+            capture_output=True).returncode:
+        pytest.skip('needs the right to mount')
+    try:
+        outcome = lmsco('track', endless_folder, '--init', start, '--output', disk / 'run')
+        rows = rows_of(disk / 'run')
+    finally:
+        subprocess.run(['umount', disk], check=True)
+    assert outcome.exit_code == 1 and 'Traceback' not in outcome.output
+    note, error = outcome.output.splitlines()[-2:]
+    assert note.startswith(f'note: kept in {disk / "run"}: boxes.csv with {len(rows)} rows')
+    assert re.match(rf'error: {disk}/run/(boxes.csv|overlay.mp4): No space left on device', error)
+    assert [int(row['frame']) for row in rows] == list(range(len(rows))) != []
 
 
 def test_refused_run_makes_no_folder(lmsco, tmp_path, scene_folder):
