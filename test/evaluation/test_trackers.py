@@ -150,7 +150,7 @@ def test_identity_follows_settings_and_code(monkeypatch, config_file):
 
 
 @pytest.mark.parametrize('text, reason', [
-    ('preset: hsc', "unknown preset 'hsc'"), ('- 1', 'holds list; expected keys and values'),
+    ('preset: hsc', "unknown preset 'hsc'"), ('- 1', 'it holds a list; expected a YAML file'),
     ('scale: {stp: 2}', "unknown key 'scale.stp'; did you mean 'step'")])
 def test_wrong_configurations_say_why(config_file, text, reason):
     with pytest.raises(ConfigError, match=reason):

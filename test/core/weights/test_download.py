@@ -169,7 +169,7 @@ def test_unreachable_proxy_is_told(goal, monkeypatch):
 
 
 def test_silence_is_told(goal, monkeypatch):
-    monkeypatch.setattr('lmsco_ros.core.backbones.download._TIMEOUT_SECONDS', (0.2, 0.2))
+    monkeypatch.setattr('lmsco_ros.core.weights.download._TIMEOUT_SECONDS', (0.2, 0.2))
     monkeypatch.setenv('NO_PROXY', '*')
     with socket.create_server(('127.0.0.1', 0)) as silent:
         url = f'http://127.0.0.1:{silent.getsockname()[1]}/file'
