@@ -76,7 +76,8 @@ def test_configuration_file(lmsco, tmp_path, scene_folder, start):
 
 
 @pytest.mark.parametrize('text, words', [
-    ('learning:\n\titerations: 1\n', 'line 2, column 1'), ('features: &all [*all]\n', 'levels deep'),
+    ('learning:\n\titerations: 1\n', 'line 2, column 1'),
+    ('features: &all [*all]\n', 'levels deep'),
     ('sampling: {newton_steps: many}', "newton_steps is 'many'; expected a int")])
 def test_configuration_that_is_none_is_named(lmsco, tmp_path, scene_folder, start, text, words):
     (tmp_path / 'mine.yaml').write_text(text)

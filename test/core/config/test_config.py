@@ -347,8 +347,10 @@ def test_place_without_a_file_is_named(tmp_path, name, reason):
 
 @pytest.mark.parametrize('text, reason', [
     ('learning: {loss: best}\n', "loss is 'best'; expected one of"),
-    ('sampling: {newton_steps: ' + '9' * 400 + '}', 'newton_steps is a number with 40 digits or more'),
-    ('sampling: {newton_steps: 0x' + 'f' * 5000 + '}', 'newton_steps is a number with 40 digits or more'),
+    ('sampling: {newton_steps: ' + '9' * 400 + '}',
+     'newton_steps is a number with 40 digits or more'),
+    ('sampling: {newton_steps: 0x' + 'f' * 5000 + '}',
+     'newton_steps is a number with 40 digits or more'),
     ('scale: {step: ' + '9' * 400 + '}', 'scale.step is a number with 40 digits or more'),
     ('sampling: {newton_steps: .inf}', 'newton_steps is inf'),
     ('sampling: {newton_steps: 1e999}', 'newton_steps is'),
