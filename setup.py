@@ -22,7 +22,6 @@ PACKAGE = 'lmsco_ros'
 
 setup(
     name=PACKAGE,
-    version='0.1.0',
     packages=find_packages(include=[f'{PACKAGE}*', 'msg_adapters*']),
     package_data={PACKAGE: [
         'core/weights/*.safetensors',
@@ -85,7 +84,7 @@ setup(
     license='Apache-2.0',
     entry_points={
         'console_scripts': [
-            f'tracker_node = {PACKAGE}.node.tracker_node:main',
+            f'tracker_node = {PACKAGE}.node.main:main',
             f'lmsco = {PACKAGE}.cli.main:main',
         ],
     },

@@ -158,7 +158,7 @@ def _visible(box: BoundingBox, image: Image) -> BoundingBox:
 def node_process(plan: Plan) -> Iterator[int]:
     """Run the node beside this process; yield its process id."""
     process = subprocess.Popen(
-        [sys.executable, '-m', 'lmsco_ros.node.tracker_node', '--ros-args',
+        [sys.executable, '-m', 'lmsco_ros.node.main', '--ros-args',
          '-p', f'preset:={plan.preset}', '-p', 'image_reliability:=reliable'])
     try:
         yield process.pid

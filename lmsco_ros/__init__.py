@@ -13,3 +13,5 @@
 # limitations under the License.
 
 """Thermal infrared tracking with a large margin structured convolution operator."""
+
+__version__ = '0.1.0'

@@ -30,6 +30,8 @@ import sys
 SUPPORTED = ((3, 10), (3, 11), (3, 12))
 INTERPRETERS = ('python3', 'python3.12', 'python3.11', 'python3.10')
 STAMP = 'lmsco_ros.stamp'
+HOLD_BACK = '/usr/bin/env -S --block-signal=INT,TERM,HUP '
+LONGEST_FIRST_LINE = 250
 SOURCES = (
     'constraints.txt', 'constraints-common.txt', 'constraints-jazzy.txt',
     'setup.py', 'scripts/bootstrap.py',
@@ -144,6 +146,31 @@ def install(root, python, jazzy, fresh):
     subprocess.run(
         pip + ['--use-pep517', '--no-build-isolation', '--editable', extras],
         cwd=root, check=True)
+    script = venv / 'bin' / 'tracker_node'
+    if script.is_file():
+        hold_signals_back(script)
+
+
+def hold_signals_back(script):
+    """
+    Let signals wait while the interpreter of the node starts, until the node heeds them.
+
+    The interpreter starts twice, since the ROS 2 wheels set a library path: some 40 ms in which
+    a signal would end the process with a traceback, or as killed.
+
+    Parameters
+    ----------
+    script : Path
+        What pip made of the entry point. It stays as it is where `env` cannot block signals, or
+        where its first line does not name the interpreter.
+
+    """
+    first, rest = script.read_text().split('\n', 1)
+    blocking = '#!' + HOLD_BACK + first[2:]
+    if (first[2:] != str(script.parent / 'python') or len(blocking) > LONGEST_FIRST_LINE
+            or subprocess.call(HOLD_BACK.split() + ['true'], stderr=subprocess.DEVNULL)):
+        return
+    script.write_text(blocking + '\n' + rest)
 
 
 def bootstrap(root, environment):

@@ -16,16 +16,12 @@
 
 from __future__ import annotations
 
-import importlib.util
-
 from lmsco_ros.cli.console import fail, FAILED
+from lmsco_ros.node.installation import without_ros
 
 
 def require_ros() -> None:
     """Leave with the remedy when there is no ROS 2 to run the node with."""
-    missing = [name for name in ('rclpy', 'sensor_msgs', 'diagnostic_msgs',
-                                 'geometry_msgs', 'visualization_msgs')
-               if importlib.util.find_spec(name) is None]
-    if missing:
-        fail(f'the node needs ROS 2, and {", ".join(missing)} is not installed; source a ROS 2 '
-             "Jazzy installation, or install the package's extra `ros`", FAILED)
+    remedy = without_ros()
+    if remedy:
+        fail(remedy, FAILED)

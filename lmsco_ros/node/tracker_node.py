@@ -17,25 +17,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-import contextlib
+from collections.abc import Callable
 import functools
-import gc
-import signal
-import sys
 import traceback
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray
 from rcl_interfaces.msg import SetParametersResult
-import rclpy
 from rclpy.clock import Clock, ClockType
 from rclpy.exceptions import ParameterException
-from rclpy.executors import SingleThreadedExecutor
 from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
 from rclpy.parameter import Parameter
 from rclpy.service import Service
-from rclpy.signals import SignalHandlerOptions
 from std_msgs.msg import Header
 from std_srvs.srv import SetBool, Trigger
 
@@ -50,8 +43,6 @@ from lmsco_ros.node.tracker_factory import make_tracker, with_fallback
 from msg_adapters.status import Level, message_from_diagnoses
 
 _HEALTH_PERIOD = 1.0
-# A signal is noticed after this time at the latest.
-_SIGNAL_PERIOD = 0.1
 _NOT_ACTIVE = 'the node is not active; activate it first'
 
 _Transition = Callable[['TrackerNode', LifecycleState], TransitionCallbackReturn]
@@ -233,67 +224,3 @@ class TrackerNode(LifecycleNode):
         self.settings = parameters.read(self)
         if self._outputs is not None:
             self._outputs.settings = self.settings
-
-
-@contextlib.contextmanager
-def _noted_signals() -> Iterator[list[int]]:
-    """
-    Collect SIGINT and SIGTERM in the list that is yielded.
-
-    The handlers of rclpy would take the context away under the hands of whoever is using it:
-    a node that is being made, the worker that publishes.
-    """
-    noted: list[int] = []
-    before = {number: signal.signal(number, lambda number, frame: noted.append(number))
-              for number in (signal.SIGINT, signal.SIGTERM)}
-    try:
-        yield noted
-    finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)
-
-
-def _spare_the_garbage_collector() -> None:
-    """
-    Take what has been made so far out of every later collection.
-
-    These are some 200,000 objects of the libraries, which stay. To go through them takes as
-    long as several frames.
-    """
-    gc.collect()
-    gc.freeze()
-
-
-def _run(noted: list[int]) -> int:
-    """Make a node, let it work until a signal is noted, and take it down."""
-    executor = SingleThreadedExecutor()
-    try:
-        node = TrackerNode()
-    except ParameterException as error:
-        print(f'tracker_node: {error}', file=sys.stderr)
-        return 1
-    try:
-        if node.settings.autostart and not node.is_active:
-            return 1
-        _spare_the_garbage_collector()
-        executor.add_node(node)
-        while not noted and rclpy.ok():
-            executor.spin_once(timeout_sec=_SIGNAL_PERIOD)
-        return 0
-    finally:
-        node.destroy_node()
-        executor.shutdown()
-
-
-def main(args: list[str] | None = None) -> int:
-    """Run the node until SIGINT or SIGTERM comes; return the exit code."""
-    with _noted_signals() as noted:
-        rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
-        try:
-            return _run(noted)
-        finally:
-            rclpy.try_shutdown()
-
-
-if __name__ == '__main__':
-    sys.exit(main())

@@ -83,7 +83,7 @@ def test_node_goes_on_with_a_new_camera_after_one_was_killed(own_graph, processe
 
 
 def test_camera_is_answered_by_a_new_node_after_one_was_killed(own_graph, processes):
-    node = start(own_graph, processes, '-m', 'lmsco_ros.node.tracker_node')
+    node = start(own_graph, processes, '-m', 'lmsco_ros.node.main')
     images = own_graph.publisher(Image, 'image_raw')
     statuses = own_graph.listen(DiagnosticArray, 'lmsco_tracker/status')
     boxes = own_graph.listen(PolygonStamped, 'lmsco_tracker/box', connected=False)
@@ -98,7 +98,7 @@ def test_camera_is_answered_by_a_new_node_after_one_was_killed(own_graph, proces
         images.publish(own_graph.image(shape=(96, 128)))
         own_graph.executor.spin_once(timeout_sec=0.01)
     statuses.clear()
-    start(own_graph, processes, '-m', 'lmsco_ros.node.tracker_node')
+    start(own_graph, processes, '-m', 'lmsco_ros.node.main')
     own_graph.spin_until(answered)
     # It knows of no target, and says nothing of images that it has not seen.
     assert {status_from_message(message).state for message in statuses} == {'idle'}

@@ -1,0 +1,142 @@
+# Copyright 2026 lmsco_ros contributors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The node in its process: started, spun until the process has to end, and taken down."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+import contextlib
+import gc
+
+import sys
+import threading
+
+import rclpy
+from rclpy.exceptions import NameValidationException, ParameterException
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.impl.implementation_singleton import rclpy_implementation
+from rclpy.logging import LoggingSeverity, set_logger_level
+from rclpy.signals import SignalHandlerOptions
+
+from lmsco_ros.node import parameter_files
+from lmsco_ros.node.ros_arguments import (check_remappings, explained, shortened, StartError,
+                                          values_of)
+from lmsco_ros.node.tracker_node import TrackerNode
+
+# The end of the process is noticed after this time at the latest.
+_LOOK_PERIOD = 0.1
+
+
+def run(arguments: Sequence[str], ending: threading.Event) -> int:
+    """
+    Run the node until the process has to end.
+
+    Parameters
+    ----------
+    arguments : sequence of str
+        Those for ROS.
+    ending : threading.Event
+        Set when the process has to end.
+
+    Returns
+    -------
+    int
+        Exit code: 1 when the node cannot start.
+
+    """
+    try:
+        with _ros(arguments), _node(arguments) as node:
+            return _spin(node, ending)
+    except StartError as error:
+        print(f'tracker_node: {error}', file=sys.stderr)
+        return 1
+
+
+@contextlib.contextmanager
+def _ros(arguments: Sequence[str]) -> Iterator[None]:
+    """Join ROS; raise StartError when it refuses the arguments."""
+    check_remappings(arguments)
+    # What ROS would log of arguments that it refuses is in the error, too.
+    set_logger_level('rcl', LoggingSeverity.FATAL)
+    try:
+        # Its signal handlers would take the context away under the hands of whoever uses it:
+        # a node that is being made, the worker that publishes.
+        rclpy.init(args=list(arguments), signal_handler_options=SignalHandlerOptions.NO)
+    except rclpy_implementation.UnknownROSArgsError as error:
+        raise StartError('ROS does not know the argument '
+                         f'{shortened(str(error).strip("[]"))}') from error
+    except rclpy_implementation.RCLError as error:
+        raise StartError(_refusal(str(error), arguments)) from error
+    finally:
+        set_logger_level('rcl', LoggingSeverity.UNSET)
+    try:
+        yield
+    finally:
+        rclpy.try_shutdown()
+
+
+def _refusal(reason: str, arguments: Sequence[str]) -> str:
+    """Say why ROS refuses the arguments."""
+    for path in values_of('--params-file', arguments):
+        if f"'--params-file {path}'" in reason:
+            return parameter_files.file_problem(
+                path, explained(reason).partition('Error: ')[2])
+    return explained(reason)
+
+
+@contextlib.contextmanager
+def _node(arguments: Sequence[str]) -> Iterator[TrackerNode]:
+    """Make the node, say what of the parameters it does not hear, and take it down."""
+    try:
+        node = TrackerNode()
+    except ParameterException as error:
+        raise StartError(f'{explained(str(error))}; config/tracker.yaml lists all parameters with '
+                         'their types and ranges') from error
+    except (NameValidationException, rclpy_implementation.RCLError) as error:
+        raise StartError(explained(str(error))) from error
+    try:
+        for warning in [
+                *parameter_files.unheard(arguments, node.get_fully_qualified_name()),
+                *parameter_files.unknown(node._parameter_overrides, node._parameters)]:
+            node.get_logger().warning(warning)
+        yield node
+    finally:
+        node.destroy_node()
+
+
+def _spin(node: TrackerNode, ending: threading.Event) -> int:
+    """Let the node work until the process has to end."""
+    if node.settings.autostart and not node.is_active:
+        return 1
+    executor = SingleThreadedExecutor()
+    try:
+        _spare_the_garbage_collector()
+        executor.add_node(node)
+        while not ending.is_set() and rclpy.ok():
+            executor.spin_once(timeout_sec=_LOOK_PERIOD)
+        return 0
+    finally:
+        executor.shutdown()
+
+
+def _spare_the_garbage_collector() -> None:
+    """
+    Take what has been made so far out of every later collection.
+
+    These are some 200,000 objects of the libraries, which stay. To go through them takes as
+    long as several frames.
+    """
+    gc.collect()
+    gc.freeze()
