@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Who publishes on the image topic, and why nothing is heard of them."""
+"""Who publishes images, why nothing is heard of them, and what would make them heard."""
 
 from __future__ import annotations
 
@@ -25,6 +25,8 @@ from rclpy.topic_endpoint_info import TopicEndpointInfo
 
 # More names than a person reads in one line.
 _MOST_TOPICS = 5
+_TRANSPORTS = {'sensor_msgs/msg/Image': 'raw', 'sensor_msgs/msg/CompressedImage': 'compressed'}
+_SUFFIX = '/compressed'
 
 
 class ImageSource(NamedTuple):
@@ -73,7 +75,7 @@ def stale_message(seconds: float, topic: str, sources: Sequence[ImageSource],
     sources : sequence of ImageSource
         The publishers there.
     elsewhere : sequence of str
-        Other topics with images.
+        Other topics with images, and how to hear them.
 
     """
     opening = f'no image for {seconds:.0f} s on {topic}: '
@@ -92,11 +94,66 @@ def stale_message(seconds: float, topic: str, sources: Sequence[ImageSource],
 
 
 def other_image_topics(node: Node, topic: str, image_type: str) -> list[str]:
-    """Return the topics, other than `topic` and the node's own, where images are offered."""
+    """
+    Return where else images are offered, the likeliest first, each with how to hear them.
+
+    The node's own topics are left out. What is told beside a topic are the arguments that the
+    node has to be started with.
+
+    Parameters
+    ----------
+    node : Node
+        Knows the graph.
+    topic : str
+        Where images are expected.
+    image_type : str
+        Type that is subscribed to.
+
+    """
     own = f'{node.get_fully_qualified_name()}/'
-    return [name for name, kinds in node.get_topic_names_and_types()
-            if image_type in kinds and name != topic and not name.startswith(own)
-            and node.count_publishers(name)]
+    offered = [(name, kind) for name, kinds in node.get_topic_names_and_types()
+               for kind in kinds if kind in _TRANSPORTS
+               and (name, kind) != (topic, image_type) and not name.startswith(own)
+               and node.count_publishers(name)]
+    base = _base(topic, image_type)
+    offered.sort(key=lambda offer: _distance(*offer, base))
+    return [f'{name} (to hear it: {_remedy(name, kind, base, image_type)})'
+            for name, kind in offered]
+
+
+def _base(topic: str, kind: str) -> str:
+    """Return the name that a topic of the transport is made from."""
+    return topic.removesuffix(_SUFFIX) if _TRANSPORTS[kind] == 'compressed' else topic
+
+
+def _distance(topic: str, kind: str, base: str) -> tuple[bool, bool, str]:
+    """Order topics: the same images first, then those of the same name elsewhere."""
+    found = _base(topic, kind)
+    return found != base, found.rpartition('/')[2] != base.rpartition('/')[2], topic
+
+
+def _remedy(topic: str, kind: str, base: str, expected: str) -> str:
+    """
+    Return the arguments that make the node hear a topic.
+
+    Parameters
+    ----------
+    topic, kind : str
+        What is offered.
+    base : str
+        What `image_raw` means at the moment.
+    expected : str
+        Type that is subscribed to.
+
+    """
+    arguments = [] if kind == expected else [f'-p image_transport:={_TRANSPORTS[kind]}']
+    found = _base(topic, kind)
+    if _TRANSPORTS[kind] == 'compressed' and found == topic:
+        # It has a name of its own, such as that of compressedDepth.
+        arguments.append(f'-r {base}{_SUFFIX}:={topic}')
+    elif found != base:
+        arguments.append(f'-r image_raw:={found}')
+    return ' '.join(arguments)
 
 
 def _full_name(info: TopicEndpointInfo) -> str:

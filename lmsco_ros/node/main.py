@@ -92,7 +92,7 @@ def main() -> None:
     code = FAILED
     try:
         code = _serve(sys.argv[1:], ending)
-    except Exception:  # noqa: B902
+    except BaseException:  # noqa: B902
         code = _unforeseen(ending)
     finally:
         # A tracker that is still at work would crash in an interpreter that takes itself down.

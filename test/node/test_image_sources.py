@@ -15,6 +15,9 @@
 
 """A camera that is not heard is named, with the reason, in the log and in the diagnostics."""
 
+import shlex
+from unittest.mock import Mock
+
 from diagnostic_msgs.msg import DiagnosticArray
 import pytest
 from rclpy.context import Context
@@ -22,7 +25,8 @@ from rclpy.node import Node
 from rclpy.qos import qos_profile_sensor_data
 from sensor_msgs.msg import CompressedImage, Image
 
-from lmsco_ros.node.image_sources import ImageSource, stale_message, unheard_warning
+from lmsco_ros.node.image_sources import (ImageSource, other_image_topics, stale_message,
+                                          unheard_warning)
 from msg_adapters.status import diagnoses_from_message, Level
 
 HEARD, DEAF = ImageSource('/camera', ''), ImageSource('/rig/eye', '(incompatible QoS: so)')
@@ -102,3 +106,65 @@ def test_silence_is_stale_and_points_to_other_images(graph, camera):
     assert diagnosis.level == Level.STALE
     # The node's own pictures are no camera.
     assert 'nobody publishes' in diagnosis.message and 'overlay' not in diagnosis.message
+
+
+RAW, COMPRESSED = 'sensor_msgs/msg/Image', 'sensor_msgs/msg/CompressedImage'
+
+
+def offers(offered, topic, kind):
+    """Return what is said of topics with publishers, and of one without."""
+    node = Mock(**{
+        'get_fully_qualified_name.return_value': '/lmsco_tracker',
+        'get_topic_names_and_types.return_value': [
+            (name, [kind]) for name, kind in [('/nobody/image_raw', RAW), *offered]]})
+    node.count_publishers = lambda name: not name.startswith('/nobody')
+    return other_image_topics(node, topic, kind)
+
+
+@pytest.mark.parametrize('offered, topic, kind, remedy', [
+    (('/cam/image_raw/compressed', COMPRESSED), '/cam/image_raw', RAW,
+     '-p image_transport:=compressed'),
+    (('/cam/image_raw', RAW), '/cam/image_raw/compressed', COMPRESSED,
+     '-p image_transport:=raw'),
+    (('/cam/image_raw', RAW), '/image_raw', RAW, '-r image_raw:=/cam/image_raw'),
+    (('/cam/image_raw/compressed', COMPRESSED), '/image_raw/compressed', COMPRESSED,
+     '-r image_raw:=/cam/image_raw'),
+    (('/cam/image_raw/compressed', COMPRESSED), '/image_raw', RAW,
+     '-p image_transport:=compressed -r image_raw:=/cam/image_raw'),
+    (('/cam/depth/compressedDepth', COMPRESSED), '/cam/depth', RAW,
+     '-p image_transport:=compressed -r /cam/depth/compressed:=/cam/depth/compressedDepth'),
+    (('/jpeg', COMPRESSED), '/image_raw/compressed', COMPRESSED,
+     '-r /image_raw/compressed:=/jpeg'),
+])
+def test_images_elsewhere_are_told_with_what_would_make_them_heard(offered, topic, kind, remedy):
+    assert offers([offered], topic, kind) == [f'{offered[0]} (to hear it: {remedy})']
+
+
+def test_likeliest_images_are_told_first_and_the_own_never():
+    found = offers([('/a/overlay', RAW), ('/lmsco_tracker/overlay', RAW), ('/b/image_raw', RAW),
+                    ('/image_raw/compressed', COMPRESSED), ('/points', 'sensor_msgs/msg/Imu')],
+                   '/image_raw', RAW)
+    assert [offer.split()[0] for offer in found] == [
+        '/image_raw/compressed', '/b/image_raw', '/a/overlay']
+
+
+@pytest.mark.parametrize('name, kind, values', [
+    ('/cam/image_raw/compressed', CompressedImage, {}),
+    ('/cam/image_raw/compressedDepth', CompressedImage, {}),
+    ('/elsewhere/image_raw/compressed', CompressedImage, {}),
+    ('/elsewhere/image_raw', Image, {}),
+    ('/cam/image_raw', Image, {'image_transport': 'compressed'}),
+])
+def test_node_hears_what_it_named_when_it_does_as_it_said(graph, camera, name, kind, values):
+    publisher = camera.create_publisher(kind, name, 5)
+    arguments = ['--ros-args', '-r', 'image_raw:=/cam/image_raw']
+    node = graph.start_tracker(cli_args=arguments, no_image_timeout=0.1, **values)
+    health = graph.listen(DiagnosticArray, '/diagnostics')
+    message = diagnosis_with(graph, health, f'{name} (to hear it: ').message
+    remedy = message.partition(f'{name} (to hear it: ')[2].partition(')')[0]
+    graph.executor.remove_node(node)
+    graph.trackers.remove(node)
+    node.destroy_node()
+    # Of two rules for one name the first counts.
+    graph.start_tracker(cli_args=['--ros-args', *shlex.split(remedy), *arguments[1:]])
+    graph.spin_until(lambda: publisher.get_subscription_count() > 0)

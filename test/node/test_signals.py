@@ -167,13 +167,13 @@ def test_other_errors_are_told_in_full(start):
     assert process.returncode == 1 and errors.startswith('Traceback') and 'OSError: gone' in errors
 
 
-def test_hang_up_is_ignored_where_it_was_before(start):
-    process = start('-c', PROCESS.format(body='time.sleep(3600)'), prefix=['nohup'])
-    wait_for(process, 'running')
-    process.send_signal(signal.SIGHUP)
-    with pytest.raises(subprocess.TimeoutExpired):
-        process.communicate(timeout=0.3)
-    ends_cleanly(process, signal.SIGTERM)
+@pytest.mark.parametrize('prefix, heeded', [([], 'True'), (['nohup'], 'False')])
+def test_hang_up_is_heeded_unless_it_is_ignored(start, prefix, heeded):
+    process = start('-c', PROCESS.format(
+        body='import signal; print(signal.SIGHUP in signal.pthread_sigmask('
+             'signal.SIG_BLOCK, []), flush=True); return 0'), prefix=prefix)
+    output, errors = process.communicate(timeout=PATIENCE)
+    assert output.split() == ['running', heeded], errors
 
 
 def test_collections_do_not_go_through_the_libraries():
