@@ -15,13 +15,19 @@
 """The package for both installers: `colcon build` and `pip install`."""
 
 from glob import glob
+from pathlib import Path
+import re
 
 from setuptools import find_packages, setup
 
 PACKAGE = 'lmsco_ros'
+# colcon cannot read the `attr:` of setup.cfg.
+VERSION = re.search(r"^__version__ = '(.+)'$",
+                    (Path(__file__).parent / PACKAGE / '__init__.py').read_text(), re.MULTILINE)
 
 setup(
     name=PACKAGE,
+    version=VERSION[1],
     packages=find_packages(include=[f'{PACKAGE}*', 'msg_adapters*']),
     package_data={PACKAGE: [
         'core/weights/*.safetensors',

@@ -116,7 +116,7 @@ def other_image_topics(node: Node, topic: str, image_type: str) -> list[str]:
                and (name, kind) != (topic, image_type) and not name.startswith(own)
                and node.count_publishers(name)]
     base = _base(topic, image_type)
-    offered.sort(key=lambda offer: _distance(*offer, base))
+    offered.sort(key=lambda offer: _distance(base, *offer))
     return [f'{name} (to hear it: {_remedy(name, kind, base, image_type)})'
             for name, kind in offered]
 
@@ -126,7 +126,7 @@ def _base(topic: str, kind: str) -> str:
     return topic.removesuffix(_SUFFIX) if _TRANSPORTS[kind] == 'compressed' else topic
 
 
-def _distance(topic: str, kind: str, base: str) -> tuple[bool, bool, str]:
+def _distance(base: str, topic: str, kind: str) -> tuple[bool, bool, str]:
     """Order topics: the same images first, then those of the same name elsewhere."""
     found = _base(topic, kind)
     return found != base, found.rpartition('/')[2] != base.rpartition('/')[2], topic

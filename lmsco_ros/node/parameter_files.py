@@ -99,7 +99,8 @@ def unknown(given: Iterable[str], known: Iterable[str]) -> list[str]:
     for name in sorted(set(given).difference(known)):
         nearest = difflib.get_close_matches(name, known, n=1)
         remedy = f'did you mean {nearest[0]}?' if nearest else 'config/tracker.yaml lists all'
-        warnings.append(f'the parameter {shortened(name)} is unknown and changes nothing; {remedy}')
+        warnings.append(
+            f'the parameter {shortened(name)} is unknown and changes nothing; {remedy}')
     return warnings
 
 

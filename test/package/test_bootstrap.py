@@ -179,6 +179,41 @@ def test_wheels_are_used_where_jazzy_is_not_usable(clone, fake_python, distribut
     assert calls[-1].endswith('--editable .[ros,test]')
 
 
+@pytest.fixture
+def script(tmp_path):
+    """Return a script that tells which signals wait, as pip writes one."""
+    python = tmp_path / 'python'
+    python.symlink_to(sys.executable)
+    script = tmp_path / 'tracker_node'
+    script.write_text(f'#!{python}\nimport signal\n'
+                      'print(*map(int, sorted(signal.pthread_sigmask(signal.SIG_BLOCK, []))))\n')
+    script.chmod(0o755)
+    return script
+
+
+def test_signals_wait_while_the_interpreter_of_the_node_starts(bootstrap, script):
+    """They are blocked when its first line runs; a second call changes nothing."""
+    for _ in range(2):
+        bootstrap.hold_signals_back(script)
+        done = subprocess.run([script], capture_output=True, text=True, check=True)
+        assert done.stdout.split() == ['1', '2', '15']
+
+
+@pytest.mark.parametrize('hold_back, first_line', [
+    ('/usr/bin/env -S --no-such-option ', None),
+    ('/usr/bin/env -S ', '#!/bin/sh'),
+])
+def test_script_stays_as_it_is_where_signals_cannot_wait(
+        bootstrap, script, monkeypatch, hold_back, first_line):
+    """An `env` without the means, and a first line that names no interpreter."""
+    monkeypatch.setattr(bootstrap, 'HOLD_BACK', hold_back)
+    if first_line:
+        script.write_text(f'{first_line}\n')
+    before = script.read_text()
+    bootstrap.hold_signals_back(script)
+    assert script.read_text() == before
+
+
 def test_failed_installation_is_tried_again(clone, fake_python):
     """A failure leaves no stamp behind, and names its step without a traceback."""
     status, message, _ = run(clone, fake_python(pip=1))

@@ -28,6 +28,8 @@ from packaging.utils import canonicalize_name
 from packaging.version import Version
 import pytest
 
+import lmsco_ros
+
 REPOSITORY = Path(__file__).resolve().parents[2]
 LIBRARIES = ('lmsco_ros', 'msg_adapters')
 # Installed from the package index where ROS 2 is: Ubuntu 24.04 has no package of them, or one that
@@ -97,7 +99,7 @@ def pins():
 def test_both_manifests_describe_the_same_package(package, metadata):
     """Name, version, description, license and maintainer are written twice and must agree."""
     assert canonicalize_name(package.name) == canonicalize_name(metadata['Name'])
-    assert package.version == metadata['Version']
+    assert package.version == metadata['Version'] == lmsco_ros.__version__
     assert package.description == metadata['Summary']
     assert package.licenses[0] == 'Apache-2.0'
     assert 'Apache-2.0' in (metadata['License'], metadata['License-Expression'])
