@@ -31,7 +31,8 @@ def generate_launch_description() -> LaunchDescription:
     return LaunchDescription([
         DeclareLaunchArgument(
             'params_file', default_value=str(CONFIG / 'tracker.yaml'),
-            description='Parameters of the node; the default lists and explains all of them'),
+            description='Parameters of the node; the default lists and explains all of them. What '
+                        'of it is not used is warned of at the start'),
         DeclareLaunchArgument(
             'image_topic', default_value='image_raw',
             description='Thermal images to track in (sensor_msgs/Image)'),
