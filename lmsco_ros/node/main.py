@@ -34,7 +34,7 @@ from lmsco_ros.node.ros_arguments import split_arguments
 
 FAILED, MISUSED = 1, 2
 # The process has a second. Most of it may be needed for a tracker that does not come back.
-_GRACE_SECONDS = 0.85
+_GRACE_SECONDS = 0.8
 _HELP = """\
 Follow a target through the images of a thermal camera: the ROS 2 node lmsco_tracker.
 
