@@ -19,7 +19,6 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 import contextlib
 import gc
-
 import sys
 import threading
 
