@@ -21,13 +21,13 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
+from lmsco_ros.evaluation.datasets.visibility import read_flags, VISIBILITY_FILES
 from lmsco_ros.evaluation.errors import SequenceError
 
 # The annotated attributes of VOT-TIR; `empty` marks the frames without any other.
 VOT_TIR_ATTRIBUTES = ('camera_motion', 'dynamics_change', 'motion_change', 'occlusion',
                       'size_change', 'empty')
 _SUFFIXES = ('.tag', '.label')
-_VALUES = {'0': False, '1': True}
 
 
 def read_attributes(folder: Path, frames: int) -> dict[str, npt.NDArray[np.bool_]]:
@@ -37,7 +37,8 @@ def read_attributes(folder: Path, frames: int) -> dict[str, npt.NDArray[np.bool_
     Parameters
     ----------
     folder : Path
-        Sequence folder with files such as `camera_motion.tag` or `occlusion.label`.
+        Sequence folder with files such as `camera_motion.tag` or `occlusion.label`; those
+        that say whether the target is seen at all are no attributes.
     frames : int
         Number of frames; shorter files are continued with 0.
 
@@ -50,22 +51,19 @@ def read_attributes(folder: Path, frames: int) -> dict[str, npt.NDArray[np.bool_
     Raises
     ------
     SequenceError
-        When a file holds anything but 0 and 1.
+        When a file holds anything but 0 and 1, or more values than there are frames.
 
     """
     attributes = {path.stem: _read(path, frames) for path in sorted(folder.iterdir())
-                  if path.suffix in _SUFFIXES}
+                  if path.suffix in _SUFFIXES and path.name not in VISIBILITY_FILES}
     if attributes and 'empty' not in attributes:
         attributes['empty'] = ~np.any(list(attributes.values()), axis=0)
     return attributes
 
 
 def _read(path: Path, frames: int) -> npt.NDArray[np.bool_]:
-    words = path.read_text(encoding='utf-8', errors='replace').split()
-    unknown = set(words) - set(_VALUES)
-    if unknown:
-        raise SequenceError(f'{path.name} holds {min(unknown)!r}; expected one 0 or 1 a frame')
-    flags = np.zeros(frames, dtype=bool)
-    values = [_VALUES[word] for word in words[:frames]]
-    flags[:len(values)] = values
-    return flags
+    values = read_flags(path)
+    if len(values) > frames:
+        raise SequenceError(f'{path.name} has {len(values)} values for {frames} frames; '
+                            'expected at most one a frame')
+    return np.append(values, np.zeros(frames - len(values), dtype=bool))

@@ -18,15 +18,17 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Iterator, Union
+from typing import Iterable, Iterator, Union
 
 from lmsco_ros.evaluation.datasets.frames import image_folder
-from lmsco_ros.evaluation.datasets.layouts import READERS
+from lmsco_ros.evaluation.datasets.layouts import FRAME_FOLDERS, Plan, READERS
 from lmsco_ros.evaluation.datasets.sequence import TrackingSequence
 from lmsco_ros.evaluation.errors import DatasetError, SequenceError
 
 _MAX_DEPTH = 3
-_FRAME_FOLDERS = ('ir', 'img', 'color', 'infrared')
+_UNTOLD = ('frames without ground truth; expected groundtruth.txt, groundtruth_rect.txt, '
+           'IR_label.json or infrared.json beside them, or anno/NAME.txt for frames/NAME '
+           '(docs/datasets.md)')
 
 
 @dataclass(frozen=True)
@@ -67,34 +69,51 @@ def scan_dataset(root: Path) -> DatasetScan:
     """
     if not root.is_dir():
         raise DatasetError(f'{root} is not a folder; give the folder of a dataset')
-    found = list(_walk(root.resolve(), _MAX_DEPTH))
+    found = list(_told_apart(_walk(root.resolve(), _MAX_DEPTH)))
     if not found:
         raise DatasetError(
             f'{root} holds no sequence; expected folders with groundtruth.txt, '
-            'groundtruth_rect.txt or IR_label.json beside frames or a video')
+            'groundtruth_rect.txt or IR_label.json beside frames or a video, or anno/ and '
+            'frames/ (docs/datasets.md)')
     return DatasetScan(
         sequences=tuple(item for item in found if isinstance(item, TrackingSequence)),
         broken=tuple(item for item in found if isinstance(item, BrokenSequence)))
 
 
 def _walk(folder: Path, depth: int) -> Iterator[Union[TrackingSequence, BrokenSequence]]:
+    name = f'{folder.parent.name}/{folder.name}'
     try:
-        sequence = _read(folder)
-    except (SequenceError, OSError) as error:
-        yield BrokenSequence(f'{folder.parent.name}/{folder.name}', str(error))
+        plans = next(filter(None, (reader(folder) for reader in READERS)), ())
+        untold = any(image_folder(folder / part) for part in FRAME_FOLDERS)
+        children = sorted(path for path in folder.iterdir() if path.is_dir())
+    except OSError as error:
+        yield BrokenSequence(name, str(error))
         return
-    if sequence is not None:
-        yield sequence
+    if plans:
+        yield from map(_read, plans)
+    elif untold:
+        yield BrokenSequence(name, _UNTOLD)
     elif depth > 0:
-        for child in sorted(path for path in folder.iterdir() if path.is_dir()):
+        for child in children:
             yield from _walk(child, depth - 1)
 
 
-def _read(folder: Path) -> Union[TrackingSequence, None]:
-    for reader in READERS:
-        sequence = reader(folder)
-        if sequence is not None:
-            return sequence
-    if any(image_folder(folder / name) for name in _FRAME_FOLDERS):
-        raise SequenceError('frames without ground truth')
-    return None
+def _read(plan: Plan) -> Union[TrackingSequence, BrokenSequence]:
+    try:
+        return plan.read()
+    except (SequenceError, OSError) as error:
+        return BrokenSequence(f'{plan.group}/{plan.name}', str(error))
+
+
+def _told_apart(found: Iterable[Union[TrackingSequence, BrokenSequence]],
+                ) -> Iterator[Union[TrackingSequence, BrokenSequence]]:
+    """Yield what was found; of several sequences of one name only the first is usable."""
+    names: set[str] = set()
+    for item in found:
+        if isinstance(item, TrackingSequence):
+            if item.full_name in names:
+                item = BrokenSequence(item.full_name, 'another sequence has this name, by which '
+                                      'results are kept; rename its folder, or evaluate it alone')
+            else:
+                names.add(item.full_name)
+        yield item

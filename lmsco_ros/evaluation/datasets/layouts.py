@@ -13,32 +13,63 @@
 # limitations under the License.
 
 """
-The folder layouts of the benchmarks, each as one pure function.
+The folder layouts of the benchmarks, each as one pure function; `docs/datasets.md` shows them.
 
-Every reader answers None for a folder that is not of its layout, raises
-`SequenceError` for one that is but cannot be used, and else returns the sequence.
-Boxes come out 0-based: (x, y) = (0, 0) is the outer corner of the first pixel.
+Every reader answers with the sequences that a folder holds in its layout, none where it is of
+another. A sequence is read when it is asked for, and raises `SequenceError` where it cannot be
+used. Boxes come out 0-based: (x, y) = (0, 0) is the outer corner of the first pixel.
 """
 
 from __future__ import annotations
 
-import json
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
-from typing import Callable, Optional
+import re
 
 import numpy as np
-import numpy.typing as npt
 
 from lmsco_ros.evaluation.datasets.attributes import read_attributes
-from lmsco_ros.evaluation.datasets.boxes_text import read_boxes
+from lmsco_ros.evaluation.datasets.boxes_json import read_json_boxes
+from lmsco_ros.evaluation.datasets.boxes_text import Boxes, read_boxes
 from lmsco_ros.evaluation.datasets.frames import FrameSource, image_folder, thermal_video
 from lmsco_ros.evaluation.datasets.sequence import TrackingSequence
+from lmsco_ros.evaluation.datasets.text_file import read_lines
+from lmsco_ros.evaluation.datasets.visibility import unseen
 from lmsco_ros.evaluation.errors import SequenceError
 
-Reader = Callable[[Path], Optional[TrackingSequence]]
+FRAME_FOLDERS = ('ir', 'img', 'color', 'infrared')
+# MATLAB's first pixel is (1, 1).
+_MATLAB_ORIGIN = (1, 1, 0, 0)
+_NUMBERED = re.compile(r'groundtruth_rect\.(\d+)\.txt')
+
+Truth = Callable[[int], Boxes]
 
 
-def read_anti_uav(folder: Path) -> Optional[TrackingSequence]:
+@dataclass(frozen=True)
+class Plan:
+    """
+    A sequence that a folder holds.
+
+    Attributes
+    ----------
+    group, name : str
+        What it is called.
+    read : callable
+        Returns the sequence, or raises `SequenceError`.
+
+    """
+
+    group: str
+    name: str
+    read: Callable[[], TrackingSequence]
+
+
+Reader = Callable[[Path], tuple[Plan, ...]]
+
+
+def read_anti_uav(folder: Path) -> tuple[Plan, ...]:
     """
     Read Anti-UAV: `IR_label.json` or `infrared.json` beside frames or a video.
 
@@ -47,61 +78,110 @@ def read_anti_uav(folder: Path) -> Optional[TrackingSequence]:
     labels = next((folder / name for name in ('IR_label.json', 'infrared.json')
                    if (folder / name).is_file()), None)
     if labels is None:
-        return None
-    frames = thermal_video(folder) or _image_folder(folder, ('infrared', 'ir', '.'))
-    return _sequence(folder, frames, _json_boxes(labels))
+        return ()
+    frames = partial(_frames, folder, ('infrared', 'ir'))
+    return (_plan(folder, folder.name, frames, lambda count: read_json_boxes(labels)),)
 
 
-def read_otb(folder: Path) -> Optional[TrackingSequence]:
+def read_otb(folder: Path) -> tuple[Plan, ...]:
     """
     Read OTB, PTB-TIR and LSOTB-TIR: `img/` and `groundtruth_rect.txt`.
 
     These files come from MATLAB, where the first pixel is (1, 1): 1 is taken off x and y.
+    Several targets of one recording have a file each, `groundtruth_rect.1.txt` and so on, and
+    become sequences of their own.
     """
-    labels = folder / 'groundtruth_rect.txt'
-    if not labels.is_file():
-        return None
-    boxes = read_boxes(labels) - (1, 1, 0, 0)
-    return _sequence(folder, _image_folder(folder, ('img', 'ir', '.')), boxes)
+    labels = {folder / 'groundtruth_rect.txt': folder.name}
+    for path in folder.glob('groundtruth_rect.*.txt'):
+        numbered = _NUMBERED.fullmatch(path.name)
+        labels.update({path: f'{folder.name}-{numbered[1]}'} if numbered else {})
+    frames = partial(_frames, folder, ('img', 'ir'))
+    return tuple(_plan(folder, name, frames, partial(_matlab_boxes, path))
+                 for path, name in sorted(labels.items()) if path.is_file())
 
 
-def read_video(folder: Path) -> Optional[TrackingSequence]:
-    """Read one video beside `groundtruth.txt` (0-based, `nan` rows where absent)."""
+def read_trackingnet(folder: Path) -> tuple[Plan, ...]:
+    """Read TrackingNet: `anno/NAME.txt` and `frames/NAME/`, coordinates as they are."""
+    if not ((folder / 'anno').is_dir() and (folder / 'frames').is_dir()):
+        return ()
+    names = {path.stem for path in (folder / 'anno').glob('*.txt')}
+    names |= {path.name for path in (folder / 'frames').iterdir() if path.is_dir()}
+    return tuple(
+        Plan(folder.name, name, partial(
+            _sequence, folder.name, name, folder / 'frames' / name,
+            partial(_image_folder, folder / 'frames' / name, ('.',)),
+            partial(read_boxes, folder / 'anno' / f'{name}.txt')))
+        for name in sorted(names))
+
+
+def read_groundtruth_txt(folder: Path) -> tuple[Plan, ...]:
+    """
+    Read VOT, LaSOT, GOT-10k and single videos: `groundtruth.txt` beside frames.
+
+    The frames are in the folder that a VOT file `sequence` names, in `ir`, `img`, `color` or
+    `infrared`, in a video, or beside the file, whatever is found first. Coordinates are used
+    as they are, which is what the VOT toolkit does too.
+    """
     labels = folder / 'groundtruth.txt'
-    frames = thermal_video(folder) if labels.is_file() else None
-    return _sequence(folder, frames, read_boxes(labels)) if frames is not None else None
-
-
-def read_vot(folder: Path) -> Optional[TrackingSequence]:
-    """
-    Read VOT: `groundtruth.txt` and frames in the folder that `sequence` names, or `ir/`.
-
-    Without a `sequence` file the frames are looked for in `ir`, `color` and the folder
-    itself. Coordinates are used as they are, which is what the VOT toolkit does too.
-    """
-    labels = folder / 'groundtruth.txt'
     if not labels.is_file():
-        return None
-    declared = _declared_channels(folder / 'sequence')
-    frames = _image_folder(folder, (*declared, 'ir', 'color', '.'))
-    return _sequence(folder, frames, read_boxes(labels))
+        return ()
+
+    def frames() -> FrameSource | None:
+        return _frames(folder, (*_declared_channels(folder / 'sequence'), *FRAME_FOLDERS))
+    return (_plan(folder, folder.name, frames, partial(read_boxes, labels)),)
 
 
-READERS: tuple[Reader, ...] = (read_anti_uav, read_otb, read_video, read_vot)
+READERS: tuple[Reader, ...] = (read_anti_uav, read_otb, read_trackingnet, read_groundtruth_txt)
 
 
-def _sequence(folder: Path, frames: Optional[FrameSource],
-              boxes: npt.NDArray[np.float64]) -> TrackingSequence:
-    if frames is None:
-        raise SequenceError('ground truth without frames; expected images or a video beside it')
-    if len(frames) != len(boxes):
-        raise SequenceError(f'{len(frames)} frames but {len(boxes)} rows of ground truth; '
-                            'both must have the same number')
-    return TrackingSequence(name=folder.name, group=folder.parent.name, frames=frames,
-                            ground_truth=boxes, attributes=read_attributes(folder, len(boxes)))
+def _plan(folder: Path, name: str, frames: Callable[[], FrameSource | None],
+          truth: Truth) -> Plan:
+    group = folder.parent.name
+    return Plan(group, name, partial(_sequence, group, name, folder, frames, truth))
 
 
-def _image_folder(folder: Path, names: tuple[str, ...]) -> Optional[FrameSource]:
+def _sequence(group: str, name: str, folder: Path, frames: Callable[[], FrameSource | None],
+              truth: Truth) -> TrackingSequence:
+    """
+    Return a sequence.
+
+    Parameters
+    ----------
+    group, name : str
+        What it is called.
+    folder : Path
+        Where files of visibility and attributes are.
+    frames : callable
+        Returns the frames, or None where there are none.
+    truth : callable
+        Returns the boxes for a number of frames.
+
+    """
+    images = frames()
+    if images is None:
+        raise SequenceError('ground truth without frames; expected images or a video beside it '
+                            '(docs/datasets.md)')
+    boxes = truth(len(images))
+    if len(images) != len(boxes):
+        first_only = ' (a test part that tells the first box only cannot be evaluated here)'
+        raise SequenceError(f'{len(images)} frames but {len(boxes)} rows of ground truth; both '
+                            f'must have the same number{first_only * (len(boxes) == 1)}')
+    boxes = np.where(unseen(folder, len(boxes))[:, None], np.nan, boxes)
+    return TrackingSequence(name=name, group=group, frames=images, ground_truth=boxes,
+                            attributes=read_attributes(folder, len(boxes)))
+
+
+def _matlab_boxes(labels: Path, frames: int) -> Boxes:
+    return read_boxes(labels, frames) - _MATLAB_ORIGIN
+
+
+def _frames(folder: Path, names: Iterable[str]) -> FrameSource | None:
+    """Return images in one of the folders, or a video, or images beside the ground truth."""
+    return (_image_folder(folder, names) or thermal_video(folder)
+            or image_folder(folder))
+
+
+def _image_folder(folder: Path, names: Iterable[str]) -> FrameSource | None:
     candidates = (image_folder(folder / name) for name in names)
     return next((frames for frames in candidates if frames is not None), None)
 
@@ -110,22 +190,8 @@ def _declared_channels(description: Path) -> tuple[str, ...]:
     """Return the image folders that a VOT `sequence` file names, the default one first."""
     if not description.is_file():
         return ()
-    lines = description.read_text(encoding='utf-8', errors='replace').splitlines()
-    entries = dict(line.split('=', 1) for line in lines if '=' in line)
+    entries = dict(line.split('=', 1) for line in read_lines(description) if '=' in line)
     folders = {key.split('.', 1)[1]: str(Path(value.strip()).parent)
                for key, value in entries.items() if key.startswith('channels.')}
     default = entries.get('channel.default', '').strip()
     return tuple(folders[name] for name in sorted(folders, key=lambda name: name != default))
-
-
-def _json_boxes(labels: Path) -> npt.NDArray[np.float64]:
-    try:
-        content = json.loads(labels.read_text(encoding='utf-8', errors='replace'))
-        exist, rectangles = content['exist'], content['gt_rect']
-        rows = [rectangle if present and len(rectangle) == 4 else [np.nan] * 4
-                for present, rectangle in zip(exist, rectangles)]
-        boxes = np.array(rows, dtype=float).reshape(-1, 4)
-    except (KeyError, TypeError, ValueError) as error:
-        raise SequenceError(f'{labels.name}: expected an object with the lists `exist` and '
-                            f'`gt_rect`, one entry a frame ({error})') from error
-    return np.where((boxes[:, 2:] > 0).all(axis=1, keepdims=True), boxes, np.nan)
