@@ -163,6 +163,76 @@ def test_groups_nest_and_broken_sequences_are_reported_with_reason(tmp_path):
     assert 'not a readable video' in reasons['b/garbled']
 
 
+def reason(root):
+    """Return why the one sequence below `root` is broken."""
+    scan = scan_dataset(root)
+    assert not scan.sequences
+    (broken,) = scan.broken
+    return broken.reason
+
+
+@pytest.mark.parametrize(('name', 'content', 'complaint'), [
+    ('absence.label', '0 1', 'absence.label has 2 values for 3 frames'),
+    ('out_of_view.txt', '0,1,0,0', 'out_of_view.txt has 4 values for 3 frames'),
+    ('full_occlusion.txt', '0,2,0', "full_occlusion.txt holds '2'; expected one number from 0 to 1"),
+    ('cover.label', '8 9 1', "cover.label holds '9'; expected one number from 0 to 8"),
+    ('occlusion.tag', '0 1 0 0', 'occlusion.tag has 4 values for 3 frames'),
+])
+def test_files_of_flags_that_do_not_fit_the_frames_are_named(tmp_path, name, content, complaint):
+    images(tmp_path, 3)
+    text(tmp_path / 'groundtruth.txt', *['1,1,3,3'] * 3)
+    text(tmp_path / name, content)
+    assert complaint in reason(tmp_path)
+
+
+def test_visibility_is_read_with_a_byte_order_mark_and_is_no_attribute(tmp_path):
+    images(tmp_path, 2)
+    text(tmp_path / 'groundtruth.txt', *['1,1,3,3'] * 2)
+    text(tmp_path / 'absence.label', '\ufeff0', '1')
+    sequence = only(tmp_path)
+    assert np.isnan(sequence.ground_truth).all(axis=1).tolist() == [False, True]
+    assert not sequence.attributes
+
+
+@pytest.mark.parametrize(('content', 'complaint'), [
+    ('', 'expected an object with the lists'), ('[1, 2]', 'expected an object with the lists'),
+    ('{"exist": [1]}', 'expected an object with the lists'),
+    ('{"exist": 1, "gt_rect": 2}', 'expected an object with the lists'),
+    ('[' * 100_000, 'expected an object with the lists'),
+    ('{"exist": [1, 1], "gt_rect": [[1, 2, 3, 4]]}', '2 entries in `exist` but 1 in `gt_rect`'),
+    ('{"exist": [1], "gt_rect": [[1, 2, 3]]}', 'entry 0 of `gt_rect` is'),
+    ('{"exist": [1], "gt_rect": [["1", 2, 3, 4]]}', 'entry 0 of `gt_rect` is'),
+    ('{"exist": [1], "gt_rect": [[1, 2, 3, NaN]]}', 'entry 0 of `gt_rect` is'),
+    (f'{{"exist": [1], "gt_rect": [[1, 2, 3, 1{"0" * 400}]]}}', 'entry 0 of `gt_rect` is'),
+    ('{"exist": [[]], "gt_rect": [[1, 2, 3, 4]]}', 'entry 0 of `exist` is'),
+])
+def test_labels_that_are_no_boxes_are_refused(tmp_path, content, complaint):
+    images(tmp_path, 1)
+    text(tmp_path / 'IR_label.json', content)
+    assert 'IR_label.json' in reason(tmp_path) and complaint in reason(tmp_path)
+
+
+def test_images_of_the_layout_come_before_a_video_beside_them(tmp_path):
+    images(tmp_path / 'img', 2)
+    video(tmp_path / 'preview.avi', 5)
+    images(tmp_path, 1)
+    text(tmp_path / 'groundtruth.txt', *['1,1,3,3'] * 2)
+    assert len(only(tmp_path).frames) == 2
+    for image in (tmp_path / 'img').iterdir():
+        image.unlink()
+    assert '5 frames but 2 rows' in reason(tmp_path)
+
+
+def test_of_two_sequences_with_one_name_the_first_is_read(tmp_path):
+    for part, box in (('left', '1,1,3,3'), ('right', '2,2,3,3')):
+        images(tmp_path / part / 'group' / 'same' / 'ir', 1)
+        text(tmp_path / part / 'group' / 'same' / 'groundtruth.txt', box)
+    scan = scan_dataset(tmp_path)
+    assert [item.ground_truth.tolist() for item in scan.sequences] == [[[1, 1, 3, 3]]]
+    assert [item.name for item in scan.broken] == ['group/same']
+    assert 'another sequence has this name' in scan.broken[0].reason
+
+
 def test_a_folder_without_sequences_is_refused(tmp_path):
     with pytest.raises(DatasetError, match='holds no sequence'):
         scan_dataset(tmp_path)

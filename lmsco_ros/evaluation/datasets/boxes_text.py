@@ -164,7 +164,7 @@ def _by_frame(rows: Sequence[NumberRow], columns: Columns, frames: int | None,
 def _places(rows: Sequence[NumberRow], columns: Columns) -> Iterator[tuple[int, NumberRow]]:
     seen: set[float] = set()
     for row in rows:
-        number = row.numbers[columns.frame] if len(row.numbers) > (columns.frame or 0) else math.nan
+        number = next(iter(row.numbers[columns.frame:]), math.nan)
         if not (number.is_integer() and 0 <= number <= _MOST_FRAMES):
             raise row.refused(f'a number of a frame is a whole one from 0 to {_MOST_FRAMES:,}')
         if number in seen:
