@@ -16,7 +16,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from argparse import ArgumentTypeError
+from collections.abc import Callable, Iterator
 import csv
 from dataclasses import dataclass
 from pathlib import Path
@@ -34,7 +35,7 @@ from lmsco_ros.evaluation.datasets import scan_dataset
 from lmsco_ros.evaluation.geometry import is_absent
 from lmsco_ros.evaluation.split import load_split
 
-__all__ = ['Clip', 'Still', 'load_clips', 'load_stills']
+__all__ = ['Clip', 'Still', 'data_folder', 'load_clips', 'load_stills']
 
 _SMALLEST_SIDE = 6.0
 _NATURAL_SIDES = (16.0, 90.0)
@@ -110,6 +111,17 @@ class Still:
 def view_of(image: npt.NDArray) -> FrameView:
     """Return an image seen through the tracker's own automatic gain."""
     return FrameView(image, AutomaticGain(IntensityConfig()).observe(image))
+
+
+def data_folder(*parts: str) -> Callable[[str], Path]:
+    """Return what makes the folder DATA of a command line, or tells which part it lacks."""
+    def folder(text: str) -> Path:
+        for part in parts:
+            if not (Path(text) / part).is_dir():
+                raise ArgumentTypeError(f'{text} holds no folder {part}; give the folder that '
+                                        f'holds {" and ".join(parts)}')
+        return Path(text)
+    return folder
 
 
 def load_clips(dataset: Path, part: str, stride: int = 1) -> list[Clip]:

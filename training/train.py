@@ -43,7 +43,7 @@ from training.features import feature_batches, FeatureObjective
 from training.flow_examples import FlowSource
 from training.loop import Batch, Objective, Schedule, take, train
 from training.pairs import PairSource
-from training.sources import Clip, load_clips, load_stills, Still
+from training.sources import Clip, data_folder, load_clips, load_stills, Still
 
 CONFIG = Path(__file__).with_name('config.yaml')
 
@@ -55,7 +55,8 @@ def main() -> None:
     """Train the network that the command line names."""
     parser = argparse.ArgumentParser(description=__doc__.split('\n\n')[0])
     parser.add_argument('network', choices=('thermal', 'thermal_flow', 'comparison'))
-    parser.add_argument('--data', type=Path, required=True)
+    parser.add_argument('--data', type=data_folder('thermal_dev', 'training_stills'),
+                        required=True)
     parser.add_argument('--output', type=Path, default=Path('training/output'))
     parser.add_argument('--minutes', type=float)
     parser.add_argument('--device', default='')

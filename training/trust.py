@@ -43,10 +43,11 @@ from lmsco_ros.core.track import Track
 from lmsco_ros.core.weights.loading import load_networks
 from lmsco_ros.evaluation.challenges import apply_challenge
 from lmsco_ros.evaluation.datasets import scan_dataset, TrackingSequence
-from lmsco_ros.evaluation.errors import SequenceError
+from lmsco_ros.evaluation.errors import EvaluationError, SequenceError
 from lmsco_ros.evaluation.geometry import is_absent
 from lmsco_ros.evaluation.protocols.confidence import auroc, auroc_terms
 from lmsco_ros.evaluation.split import load_split
+from training.sources import data_folder
 from training.train import CONFIG
 
 CHALLENGES = ('', 'disappear_1s', 'disappear_3s', 'leave', 'cut', 'twin', 'twin_remains',
@@ -91,17 +92,19 @@ class RecordingTrack(Track):
         return sighting
 
 
-def main() -> None:
-    """Track, fit and print."""
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Track, fit and print; leave with 2 where there is nothing to track."""
     parser = argparse.ArgumentParser(description=__doc__.split('\n\n')[0])
-    parser.add_argument('--data', type=Path, required=True)
-    parser.add_argument('--frames', type=int, default=150)
-    options = parser.parse_args()
+    parser.add_argument('--data', type=data_folder('thermal_dev'), required=True)
+    parser.add_argument('--frames', type=int, default=150, help='of each clip, at least 2')
+    options = parser.parse_args(arguments)
+    if options.frames < 2:
+        parser.error(f'argument --frames: {options.frames} frames; at least 2 are needed')
+    try:
+        sequences = validation_clips(options.data / 'thermal_dev', options.frames)
+    except EvaluationError as error:
+        parser.error(f'argument --data: {error}')
     limit_threads(1)
-    every = yaml.safe_load(CONFIG.read_text(encoding='utf-8'))['validation']['every']
-    known = scan_dataset(options.data / 'thermal_dev').sequences
-    sequences = [sequence.first(min(options.frames, len(sequence)))
-                 for sequence in load_split().select('train', known)[::every]]
     records = {name: list(record_all(sequences, name)) for name in CHALLENGES}
     everything = [part for name, parts in records.items() if name not in COPIES
                   for part in parts]
@@ -110,6 +113,21 @@ def main() -> None:
         print(label, ' '.join(f'{value:.2f}' for value in weights))
         for name, parts in records.items():
             print(f'    {name or "plain":<14}{separation(parts, columns, weights):.3f}')
+
+
+def validation_clips(dataset: Path, frames: int) -> list[TrackingSequence]:
+    """
+    Return the first frames of every clip that training looks at but does not learn from.
+
+    Raises
+    ------
+    EvaluationError
+        When the dataset holds none of them.
+
+    """
+    every = yaml.safe_load(CONFIG.read_text(encoding='utf-8'))['validation']['every']
+    known = load_split().select('train', scan_dataset(dataset).sequences)
+    return [clip.first(min(frames, len(clip))) for clip in known[::every]]
 
 
 def record_all(sequences: Sequence[TrackingSequence], challenge: str) -> Iterator[Records]:

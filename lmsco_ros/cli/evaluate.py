@@ -16,6 +16,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import closing, contextmanager
 from enum import Enum
 from pathlib import Path
 from typing import Annotated, Optional, TYPE_CHECKING
@@ -23,7 +25,7 @@ from typing import Annotated, Optional, TYPE_CHECKING
 import typer
 
 from lmsco_ros.cli.console import (
-    frame_progress, plain_errors, say, telling_what_is_kept, warn)
+    fail, frame_progress, MISUSED, plain_errors, say, telling_what_is_kept, warn)
 
 if TYPE_CHECKING:
     from lmsco_ros.evaluation.runner import Evaluation
@@ -84,24 +86,29 @@ def evaluate(
     from lmsco_ros.evaluation.runner import Evaluation
     from lmsco_ros.evaluation.session import (
         build_trackers, buildable_trackers, describe, Request, select_sequences)
+    from lmsco_ros.evaluation.whole_file import alone_in
 
     with plain_errors():
-        request = Request(dataset, sequences, frames, split.value if split else None,
-                          challenge_names(challenge or []))
-        trackers, unavailable = (
-            (build_trackers(tracker), ()) if tracker else buildable_trackers())
-        for reason in unavailable:
-            warn(f'left out: {reason}')
-        selection = select_sequences(request)
+        with _misuse():
+            request = Request(dataset, sequences, frames, split.value if split else None,
+                              challenge_names(challenge or []))
+            trackers, unavailable = (
+                (build_trackers(tracker), ()) if tracker else buildable_trackers())
+            for reason in unavailable:
+                warn(f'left out: {reason}')
+            selection = select_sequences(request)
         evaluation = Evaluation(trackers, selection.sequences, protocol.value, output)
-        with telling_what_is_kept(lambda: f'kept in {output}: the results of all finished '
-                                          'sequences; the same command goes on from there'):
+        for reason in evaluation.damaged:
+            warn(f'{reason}; it is made again')
+        with telling_what_is_kept(lambda: _kept(evaluation, output)):
             _run(evaluation, jobs)
-        skipped = [*selection.broken, *evaluation.skipped]
-        for item in skipped:
-            warn(f'skipped {item.name}: {item.reason}')
-        evaluation.finish(describe(request, jobs, skipped))
-        say(f'report: {_report(output, selection)}')
+            skipped = [*selection.broken, *evaluation.skipped]
+            for item in skipped:
+                warn(f'skipped {item.name}: {item.reason}')
+            with alone_in(output):
+                evaluation.finish(describe(request, jobs, skipped))
+                page = _report(output, selection)
+        say(f'report: {page}')
 
 
 def results(
@@ -112,23 +119,43 @@ def results(
 ) -> None:
     """Write the tables of evaluations as one Markdown page."""
     from lmsco_ros.evaluation.results_page import results_page
+    from lmsco_ros.evaluation.whole_file import write_whole
 
     with plain_errors():
-        text = results_page(folders)
-        page.parent.mkdir(parents=True, exist_ok=True)
-        partial = page.with_name(f'.{page.name}.partial')
-        partial.write_text(text, encoding='utf-8')
-        partial.replace(page)
+        write_whole(page, results_page(folders).encode())
         say(f'results: {page}')
+
+
+@contextmanager
+def _misuse() -> Iterator[None]:
+    """Leave as after misuse where a command asks for what is not there."""
+    from lmsco_ros.evaluation.errors import RequestError, TrackerError
+
+    try:
+        yield
+    except (RequestError, TrackerError) as error:
+        fail(str(error), MISUSED)
+
+
+def _kept(evaluation: Evaluation, output: Path) -> str:
+    """Return what is kept of an evaluation that is broken off, and how it goes on."""
+    total = len(evaluation.done) + len(evaluation.pending)
+    return (f'{evaluation.finished} of {total} results are kept in {output}; the same command '
+            'goes on from there')
 
 
 def _report(output: Path, selection: Selection) -> Path:
     """Write the report on all protocols that have been run into the folder."""
+    from lmsco_ros.evaluation.errors import ResultError
     from lmsco_ros.evaluation.report.page import write_report
     from lmsco_ros.evaluation.run_file import read_runs
 
-    return write_report(output, read_runs(output),
-                        {item.full_name: item for item in selection.sequences})
+    runs, complaints = read_runs(output)
+    if not runs:
+        raise ResultError('; '.join(complaints))
+    for complaint in complaints:
+        warn(f'not in the report: {complaint}')
+    return write_report(output, runs, {item.full_name: item for item in selection.sequences})
 
 
 def _run(evaluation: Evaluation, jobs: int) -> None:
@@ -137,10 +164,10 @@ def _run(evaluation: Evaluation, jobs: int) -> None:
             f'{len(evaluation.pending)} to go')
     if not evaluation.pending:
         return
-    with frame_progress() as progress:
+    with closing(evaluation.run(jobs)) as outcomes, frame_progress() as progress:
         total = sum(len(job.sequence) for job in evaluation.pending)
         task = progress.add_task('evaluating', total=total)
-        for job, outcome in evaluation.run(jobs):
+        for job, outcome in outcomes:
             progress.advance(task, len(job.sequence))
             progress.console.print(_line(job, outcome), highlight=False, markup=False)
 

@@ -23,6 +23,14 @@ class DatasetError(EvaluationError):
     """A dataset folder holds nothing that can be evaluated."""
 
 
+class RequestError(DatasetError):
+    """What was asked for, such as a sequence of that name, is not there."""
+
+
+class ResultError(EvaluationError):
+    """A file of an earlier evaluation is damaged or missing."""
+
+
 class SequenceError(EvaluationError):
     """One sequence is broken; the others of its dataset can still be used."""
 

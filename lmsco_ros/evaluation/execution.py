@@ -126,12 +126,12 @@ class _Recorder:
         wall, cpu = time.perf_counter(), time.process_time()
         try:
             answer = self._tracker.update(image)
-        except Exception as error:  # As above.
+            self._cpu += time.process_time() - cpu
+            self._wall += time.perf_counter() - wall
+            self._updates += 1
+            self._write(index, answer)
+        except Exception as error:  # As above, and so is what is no answer.
             return self._note(index, error)
-        self._cpu += time.process_time() - cpu
-        self._wall += time.perf_counter() - wall
-        self._updates += 1
-        self._write(index, answer)
         return True
 
     def missed(self, index: int) -> bool:

@@ -17,17 +17,17 @@
 from __future__ import annotations
 
 import hashlib
-import json
-import os
 from pathlib import Path
 import re
-import tempfile
-from typing import Any, Optional
+from typing import Any, Mapping, Optional
 
 from lmsco_ros.evaluation import execution, geometry, trace
 from lmsco_ros.evaluation.datasets import frames
+from lmsco_ros.evaluation.errors import ResultError
+from lmsco_ros.evaluation.plain_values import damaged, MISFITS, read_object
 from lmsco_ros.evaluation.trace import Trace
 from lmsco_ros.evaluation.trackers.code_version import sources_digest
+from lmsco_ros.evaluation.whole_file import write_json
 from lmsco_ros.evaluation.worker_pool import Job
 
 
@@ -61,12 +61,30 @@ class RecordStore:
         parts = (self._identities[job.tracker.name], job.sequence.fingerprint, job.protocol,
                  self._code)
         digest = hashlib.sha256('\0'.join(parts).encode()).hexdigest()[:12]
-        name = _file_name(f'{job.sequence.group}-{job.sequence.name}')
-        return Path('records', job.protocol, _file_name(job.tracker.name), f'{name}-{digest}.json')
+        name = file_name(f'{job.sequence.group}-{job.sequence.name}')
+        return Path('records', job.protocol, file_name(job.tracker.name), f'{name}-{digest}.json')
 
     def holds(self, job: Job) -> bool:
-        """Return whether `job` has been done."""
-        return (self._output / self.path(job)).is_file()
+        """
+        Return whether `job` has been done.
+
+        Raises
+        ------
+        ResultError
+            When there is a record that is damaged, or of something else.
+
+        """
+        path = self._output / self.path(job)
+        if not path.is_file():
+            return False
+        content = read_object(path)
+        said = tuple(content.get(key) for key in ('tracker', 'sequence', 'protocol'))
+        if said != (job.tracker.name, job.sequence.full_name, job.protocol):
+            raise ResultError(f'{path} is damaged (it is a record of something else)')
+        frames = len(_trace(path, content).scores)
+        if frames != len(job.sequence):
+            raise ResultError(f'{path} is damaged ({frames} frames of {len(job.sequence)})')
+        return True
 
     def write(self, job: Job, result: Trace) -> None:
         """Store what came out of `job`."""
@@ -76,25 +94,25 @@ class RecordStore:
 
 
 def read_record(path: Path) -> Optional[Trace]:
-    """Return the trace in a record file, or None when there is no such file."""
-    if not path.is_file():
-        return None
-    return Trace.from_json(json.loads(path.read_text(encoding='utf-8')))
+    """
+    Return the trace in a record file, or None when there is no such file.
+
+    Raises
+    ------
+    ResultError
+        When the file is damaged.
+
+    """
+    return _trace(path, read_object(path)) if path.is_file() else None
 
 
-def write_json(path: Path, content: Any) -> None:
-    """Write a JSON file that is either complete or not there at all."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    descriptor, temporary = tempfile.mkstemp(dir=path.parent, prefix='.', suffix='.partial')
+def _trace(path: Path, content: Mapping[str, Any]) -> Trace:
     try:
-        with os.fdopen(descriptor, 'w', encoding='utf-8') as stream:
-            json.dump(content, stream)
-        os.chmod(temporary, 0o644)
-        os.replace(temporary, path)
-    except BaseException:
-        os.unlink(temporary)
-        raise
+        return Trace.from_json(content)
+    except MISFITS as error:
+        raise ResultError(damaged(path, error)) from error
 
 
-def _file_name(text: str) -> str:
+def file_name(text: str) -> str:
+    """Return `text` without what a file's name may not hold."""
     return re.sub(r'[^\w.+-]', '_', text)

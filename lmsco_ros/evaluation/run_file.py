@@ -23,18 +23,21 @@ tables and the report are made from.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-import json
 from pathlib import Path
 from typing import Any, Mapping, Optional
 
 import numpy as np
 import numpy.typing as npt
 
-from lmsco_ros.evaluation.errors import DatasetError
+from lmsco_ros.evaluation.challenges import CHALLENGES
+from lmsco_ros.evaluation.errors import ResultError
 from lmsco_ros.evaluation.execution import PROTOCOLS
 from lmsco_ros.evaluation.geometry import overlaps
-from lmsco_ros.evaluation.record_store import read_record, write_json
+from lmsco_ros.evaluation.plain_values import (
+    box_rows, damaged, MISFITS, read_object, the_list, the_object, the_text, whole_numbers)
+from lmsco_ros.evaluation.record_store import read_record
 from lmsco_ros.evaluation.trace import Trace
+from lmsco_ros.evaluation.whole_file import write_json
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,13 +87,22 @@ class SequenceInfo:
 
     @classmethod
     def from_json(cls, content: Mapping[str, Any]) -> SequenceInfo:
-        """Return the sequence that `to_json` described."""
-        rows = [row or [np.nan] * 4 for row in content['ground_truth']]
-        frames = np.arange(len(rows))
-        attributes = {name: np.isin(frames, indices)
-                      for name, indices in content['attributes'].items()}
-        return cls(content['name'], content['group'], tuple(content['size']),
-                   np.array(rows, dtype=float), attributes, content.get('challenge', ''))
+        """
+        Return the sequence that `to_json` described.
+
+        Raises
+        ------
+        KeyError, OverflowError, TypeError, ValueError
+            When `content` is something else.
+
+        """
+        boxes = box_rows(the_object(content)['ground_truth'])
+        width, height = whole_numbers(content['size'])
+        frames = np.arange(len(boxes))
+        attributes = {name: np.isin(frames, whole_numbers(indices, len(boxes)))
+                      for name, indices in the_object(content['attributes']).items()}
+        return cls(the_text(content['name']), the_text(content['group']), (width, height),
+                   boxes, attributes, the_text(content.get('challenge', '')))
 
 
 @dataclass(frozen=True, eq=False)
@@ -159,25 +171,70 @@ def write_run(output: Path, protocol: str, sequences: tuple[SequenceInfo, ...],
 
 
 def read_run(output: Path, protocol: str) -> Optional[EvaluationRun]:
-    """Return the run under `protocol`, or None when the folder has none."""
+    """
+    Return the run under `protocol`, or None when the folder has none.
+
+    Raises
+    ------
+    ResultError
+        When the run file, or a record that it names, is damaged or missing.
+
+    """
     path = run_path(output, protocol)
     if not path.is_file():
         return None
-    content = json.loads(path.read_text(encoding='utf-8'))
-    traces = {name: tuple(_record(output / record) for record in records)
-              for name, records in content['records'].items()}
-    sequences = tuple(SequenceInfo.from_json(item) for item in content['sequences'])
-    return EvaluationRun(content['protocol'], sequences, traces, content['context'])
+    try:
+        return _run(output, protocol, read_object(path))
+    except MISFITS as error:
+        said = str(error) if isinstance(error, ResultError) else damaged(path, error)
+        raise ResultError(f'{said}; run `lmsco evaluate` with --protocol {protocol} and the same '
+                          f'--output {output} again') from error
 
 
-def read_runs(output: Path) -> dict[str, EvaluationRun]:
-    """Return the runs in a folder by their protocol."""
-    return {protocol: run for protocol in PROTOCOLS
-            if (run := read_run(output, protocol)) is not None}
+def read_runs(output: Path) -> tuple[dict[str, EvaluationRun], tuple[str, ...]]:
+    """Return the runs in a folder by their protocol, and why others cannot be read."""
+    runs: dict[str, EvaluationRun] = {}
+    complaints: list[str] = []
+    for protocol in PROTOCOLS:
+        try:
+            run = read_run(output, protocol)
+        except ResultError as error:
+            complaints.append(str(error))
+        else:
+            runs.update({} if run is None else {protocol: run})
+    return runs, tuple(complaints)
+
+
+def _run(output: Path, protocol: str, content: Mapping[str, Any]) -> EvaluationRun:
+    """Return the run that a file describes; anything may be raised where it describes none."""
+    sequences = tuple(map(SequenceInfo.from_json, the_list(content['sequences'])))
+    lengths = [len(sequence.ground_truth) for sequence in sequences]
+    unknown = {sequence.challenge for sequence in sequences} - {'', *CHALLENGES}
+    if not lengths or unknown:
+        raise ValueError(f'unknown challenges {sorted(unknown)}' if unknown else 'no sequences')
+    traces = {}
+    for name, records in the_object(content['records']).items():
+        traces[name] = tuple(_record(output / the_text(record)) for record in the_list(records))
+        if [len(trace.scores) for trace in traces[name]] != lengths:
+            raise ValueError(f'the records of {name} do not fit the sequences')
+    if content['protocol'] != protocol:
+        raise ValueError('it is of another protocol')
+    return EvaluationRun(protocol, sequences, traces, _context(content['context']))
+
+
+def _context(content: Any) -> Mapping[str, Any]:
+    """Return what a run file says of its making, if it can be shown."""
+    for name in ('machine', 'versions'):
+        the_object(the_object(content).get(name, {}))
+    for item in the_list(content.get('skipped', [])):
+        the_text(item['name'] + item['reason'])
+    for word in (*the_list(content.get('challenges', [])), content.get('sequences', '')):
+        the_text(word)
+    return content
 
 
 def _record(path: Path) -> Trace:
     trace = read_record(path)
     if trace is None:
-        raise DatasetError(f'record {path.name} is missing; run the evaluation again')
+        raise ResultError(f'{path} is missing')
     return trace

@@ -16,11 +16,12 @@
 
 from __future__ import annotations
 
+from contextlib import closing
 from pathlib import Path
-from typing import Any, Iterator, Mapping, Sequence
+from typing import Any, Generator, Mapping, Sequence
 
 from lmsco_ros.evaluation.datasets import BrokenSequence, TrackingSequence
-from lmsco_ros.evaluation.errors import DatasetError, SequenceError
+from lmsco_ros.evaluation.errors import DatasetError, ResultError, SequenceError
 from lmsco_ros.evaluation.record_store import RecordStore
 from lmsco_ros.evaluation.run_file import SequenceInfo, write_run
 from lmsco_ros.evaluation.trackers import TrackerSpec
@@ -42,6 +43,17 @@ class Evaluation:
     output : Path
         Folder for records and the run file.
 
+    Attributes
+    ----------
+    done, pending : tuple of Job
+        What has a record already, and what has none or a damaged one.
+    damaged : list of str
+        What is wrong with which record.
+    finished : int
+        Number of records that are kept by now.
+    skipped : list of BrokenSequence
+        Sequences that turned out to be unreadable.
+
     """
 
     def __init__(self, trackers: Sequence[TrackerSpec], sequences: Sequence[TrackingSequence],
@@ -59,17 +71,29 @@ class Evaluation:
                            if sequence.full_name in self._infos]
         jobs = [Job(tracker, sequence, protocol)
                 for sequence in self._sequences for tracker in self._trackers]
-        self.pending = tuple(job for job in jobs if not self._store.holds(job))
-        self.done = tuple(job for job in jobs if self._store.holds(job))
+        self.damaged: list[str] = []
+        held = [self._holds(job) for job in jobs]
+        self.pending = tuple(job for job, there in zip(jobs, held) if not there)
+        self.done = tuple(job for job, there in zip(jobs, held) if there)
+        self.finished = len(self.done)
 
-    def run(self, workers: int) -> Iterator[tuple[Job, Outcome]]:
+    def _holds(self, job: Job) -> bool:
+        try:
+            return self._store.holds(job)
+        except ResultError as error:
+            self.damaged.append(str(error))
+            return False
+
+    def run(self, workers: int) -> Generator[tuple[Job, Outcome], None, None]:
         """Run what is pending in `workers` processes and yield each job that is done."""
-        for job, outcome in run_jobs(self.pending, workers):
-            if isinstance(outcome, Unreadable):
-                self._drop(job.sequence.full_name, outcome.reason)
-            else:
-                self._store.write(job, outcome)
-            yield job, outcome
+        with closing(run_jobs(self.pending, workers)) as outcomes:
+            for job, outcome in outcomes:
+                if isinstance(outcome, Unreadable):
+                    self._drop(job.sequence.full_name, outcome.reason)
+                else:
+                    self._store.write(job, outcome)
+                    self.finished += 1
+                yield job, outcome
 
     def finish(self, context: Mapping[str, Any]) -> None:
         """

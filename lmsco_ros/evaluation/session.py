@@ -19,6 +19,7 @@ from __future__ import annotations
 from collections import Counter
 from dataclasses import dataclass
 from datetime import date
+from difflib import get_close_matches
 from fnmatch import fnmatch
 from pathlib import Path
 from typing import Any, Optional, Sequence
@@ -26,9 +27,12 @@ from typing import Any, Optional, Sequence
 from lmsco_ros.evaluation.challenges import apply_challenge
 from lmsco_ros.evaluation.datasets import BrokenSequence, scan_dataset, TrackingSequence
 from lmsco_ros.evaluation.environment import machine, versions
-from lmsco_ros.evaluation.errors import DatasetError, SequenceError, TrackerError
+from lmsco_ros.evaluation.errors import (
+    DatasetError, RequestError, SequenceError, TrackerError)
 from lmsco_ros.evaluation.split import load_split
 from lmsco_ros.evaluation.trackers import available_names, resolve, TrackerSpec
+
+_NAMES_SHOWN = 6
 
 
 @dataclass(frozen=True)
@@ -72,13 +76,18 @@ def select_sequences(request: Request) -> Selection:
 
     Raises
     ------
+    RequestError
+        When there is no such dataset, pattern or part of the split.
     DatasetError
-        When none is left.
+        When none is left that can be used.
 
     """
     scan = scan_dataset(request.dataset)
     chosen = [item for item in scan.sequences if _matches(item.full_name, request.pattern)]
     broken = [item for item in scan.broken if _matches(item.name, request.pattern)]
+    if not chosen and not broken:
+        raise RequestError(_unmatched(request, [
+            *(item.full_name for item in scan.sequences), *(item.name for item in scan.broken)]))
     if request.part is not None:
         split = load_split()
         chosen = split.select(request.part, chosen)
@@ -120,7 +129,13 @@ def build_trackers(names: Sequence[str]) -> tuple[TrackerSpec, ...]:
             raise TrackerError(f'{count} trackers are called {name!r}, which is what tables and '
                                'folders tell them apart by; rename the file or the tracker')
     for spec in specs:
-        spec.build().close()
+        try:
+            spec.build().close()
+        except TrackerError:
+            raise
+        except Exception as error:  # Whatever is thrown by code that is not ours.
+            raise TrackerError(f'tracker {spec.name!r} cannot be built: '
+                               f'{type(error).__name__}: {error}') from error
     return specs
 
 
@@ -145,6 +160,17 @@ def describe(request: Request, jobs: int, skipped: Sequence[BrokenSequence]) -> 
         'date': date.today().isoformat(), 'machine': machine(), 'versions': dict(versions()),
         'skipped': [{'name': item.name, 'reason': item.reason} for item in skipped],
     }
+
+
+def _unmatched(request: Request, names: Sequence[str]) -> str:
+    """Return what to say of a pattern that no name matches."""
+    near = [*get_close_matches(request.pattern, names),
+            *get_close_matches(request.pattern, [name.rpartition('/')[2] for name in names])]
+    shown = list(dict.fromkeys(near)) or sorted(names)
+    more = f' and {len(shown) - _NAMES_SHOWN} more' if len(shown) > _NAMES_SHOWN else ''
+    return (f'no sequence of {request.dataset} matches {request.pattern!r}; '
+            f'{"near are" if near else "there are"} {", ".join(shown[:_NAMES_SHOWN])}{more}; a '
+            'pattern is a name or group/name in which * stands for anything')
 
 
 def _cut(sequences: Sequence[TrackingSequence], frames: int,

@@ -23,7 +23,7 @@ from typing import Iterable, Mapping
 import yaml
 
 from lmsco_ros.evaluation.datasets import TrackingSequence
-from lmsco_ros.evaluation.errors import DatasetError
+from lmsco_ros.evaluation.errors import RequestError
 
 _PACKAGE = 'lmsco_ros.evaluation.splits'
 
@@ -54,16 +54,16 @@ class Split:
 
         Raises
         ------
-        DatasetError
+        RequestError
             When the split has no such part, or none of its sequences is there.
 
         """
         if part not in self.parts:
-            raise DatasetError(f'split {self.name} has no part {part!r}; '
+            raise RequestError(f'split {self.name} has no part {part!r}; '
                                f'it has {", ".join(sorted(self.parts))}')
         found = [sequence for sequence in sequences if sequence.full_name in self.parts[part]]
         if not found:
-            raise DatasetError(f'no sequence of this dataset is in part {part!r} of the split '
+            raise RequestError(f'no sequence of this dataset is in part {part!r} of the split '
                                f'{self.name}, which names sequences as group/name')
         return found
 

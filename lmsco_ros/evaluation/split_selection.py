@@ -139,7 +139,10 @@ def split_content(sequences: Iterable[TrackingSequence], several: frozenset[str]
 
 def main(dataset: Path) -> None:
     """Print the split of the dataset folder."""
-    with (dataset / CHOSEN_GROUP / 'summary.csv').open(encoding='utf-8') as stream:
+    summary = dataset / CHOSEN_GROUP / 'summary.csv'
+    if not summary.is_file():
+        raise typer.BadParameter(f'there is no {summary}; give the folder thermal_dev')
+    with summary.open(encoding='utf-8') as stream:
         several = frozenset(_several_targets(csv.DictReader(stream)))
     content = split_content(scan_dataset(dataset).sequences, several)
     print('# Written by: python -m lmsco_ros.evaluation.split_selection THERMAL_DEV\n'

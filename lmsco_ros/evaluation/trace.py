@@ -22,6 +22,9 @@ from typing import Any, Mapping, Optional
 import numpy as np
 import numpy.typing as npt
 
+from lmsco_ros.evaluation.plain_values import (
+    box_rows, number, numbers, the_list, the_text, whole_number, whole_numbers)
+
 _DECIMALS = 4
 
 
@@ -83,15 +86,28 @@ class Trace:
 
     @classmethod
     def from_json(cls, content: Mapping[str, Any]) -> Trace:
-        """Return the trace that `to_json` described."""
-        scores = np.array(content['scores'], dtype=float)
+        """
+        Return the trace that `to_json` described.
+
+        Raises
+        ------
+        KeyError, OverflowError, TypeError, ValueError
+            When `content` is something else.
+
+        """
+        boxes, scores = box_rows(content['boxes']), numbers(the_list(content['scores']))
+        if len(boxes) != len(scores):
+            raise ValueError(f'{len(boxes)} boxes but {len(scores)} scores')
         lost = np.zeros(len(scores), dtype=bool)
-        lost[content['lost']] = True
-        return cls(boxes=np.array(content['boxes'], dtype=float).reshape(-1, 4), scores=scores,
-                   lost=lost, starts=tuple(content['starts']),
-                   failures=tuple(content['failures']), updates=content['updates'],
-                   cpu_seconds=float(np.array(content['cpu_seconds'], dtype=float)),
-                   wall_seconds=content['wall_seconds'], error=content['error'])
+        lost[whole_numbers(content['lost'], len(scores))] = True
+        error, seconds = content['error'], content['cpu_seconds']
+        return cls(boxes=boxes, scores=scores, lost=lost,
+                   starts=tuple(whole_numbers(content['starts'], len(scores))),
+                   failures=tuple(whole_numbers(content['failures'], len(scores))),
+                   updates=whole_number(content['updates']),
+                   cpu_seconds=np.nan if seconds is None else number(seconds),
+                   wall_seconds=number(content['wall_seconds']),
+                   error=None if error is None else the_text(error))
 
 
 def _plain(values: npt.NDArray[np.float64]) -> list[Optional[float]]:

@@ -18,26 +18,36 @@ Spawned processes that run one tracker over one sequence at a time.
 Each worker computes in a single thread, so that frames per second compare. A worker
 that dies takes only its own job with it: the job is reported and the next one gets
 a new worker, which `concurrent.futures` does not offer.
+
+A worker leads a process group of its own, with whatever its tracker starts. So a signal to the
+group of this process, such as Ctrl-C, does not make a worker look like a tracker that crashed,
+and nothing outlives its end or that of this process, however that came.
 """
 
 from __future__ import annotations
 
 from collections import deque
+from contextlib import suppress
 from dataclasses import dataclass
 import multiprocessing
 from multiprocessing.connection import Connection, wait
+import os
 import signal
 import sys
-from typing import Any, Iterator, Sequence, Union
+import threading
+from typing import Any, Generator, Sequence, Union
 
 import cv2
 from threadpoolctl import threadpool_limits
 
 from lmsco_ros.evaluation.datasets import TrackingSequence
-from lmsco_ros.evaluation.errors import SequenceError, TrackerError
+from lmsco_ros.evaluation.errors import EvaluationError, SequenceError, TrackerError
 from lmsco_ros.evaluation.execution import PROTOCOLS
 from lmsco_ros.evaluation.trace import Trace
 from lmsco_ros.evaluation.trackers import TrackerSpec
+
+# What asks a process to end; a tracker that crashes does not die of these.
+_ENDING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,7 +69,8 @@ class Unreadable:
 Outcome = Union[Trace, Unreadable]
 
 
-def run_jobs(jobs: Sequence[Job], workers: int) -> Iterator[tuple[Job, Outcome]]:
+def run_jobs(jobs: Sequence[Job], workers: int,
+             ) -> Generator[tuple[Job, Outcome], None, None]:
     """
     Yield each job with its outcome, in the order in which they finish.
 
@@ -69,6 +80,11 @@ def run_jobs(jobs: Sequence[Job], workers: int) -> Iterator[tuple[Job, Outcome]]
         What to run; nothing is started without any.
     workers : int
         Number of processes.
+
+    Raises
+    ------
+    EvaluationError
+        When somebody ended a worker by a signal, which says nothing of its tracker.
 
     """
     pending = deque(jobs)
@@ -100,32 +116,61 @@ class _Worker:
         context = multiprocessing.get_context('spawn')
         self.connection, theirs = context.Pipe()
         self._process = context.Process(target=_serve, args=(theirs,), daemon=True)
-        self._process.start()
+        # It inherits that signals wait, until it leads its own group.
+        waiting = signal.pthread_sigmask(signal.SIG_BLOCK, _ENDING)
+        try:
+            self._process.start()
+        finally:
+            signal.pthread_sigmask(signal.SIG_SETMASK, waiting)
         theirs.close()
 
     def obituary(self) -> str:
         """Return what is known of a process that died."""
+        os.waitid(os.P_PID, self._pid, os.WEXITED | os.WNOWAIT)
+        self._end_group()
         self._process.join()
-        return f'the process died with exit code {self._process.exitcode}'
+        code = self._process.exitcode or 0
+        if -code in _ENDING:
+            raise EvaluationError(f'a worker process was ended by {signal.Signals(-code).name}')
+        return f'the process died with exit code {code}'
 
     def stop(self) -> None:
-        """End the process whatever it does."""
+        """End the process whatever it does, and all that it started."""
         self.connection.close()
+        self._end_group()
         self._process.kill()
         self._process.join()
+
+    @property
+    def _pid(self) -> int:
+        assert self._process.pid is not None
+        return self._process.pid
+
+    def _end_group(self) -> None:
+        """End the group that a process leads that was not waited for yet."""
+        with suppress(ProcessLookupError, PermissionError):
+            os.killpg(self._pid, signal.SIGKILL)
 
 
 def _serve(connection: Connection) -> None:
     """Answer jobs until the other side hangs up."""
-    # Terminals and `timeout` signal the whole group; the other side decides, lest a worker that
-    # dies of it is taken for a tracker that crashed.
-    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
-        signal.signal(number, signal.SIG_IGN)
+    os.setsid()
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    signal.pthread_sigmask(signal.SIG_UNBLOCK, _ENDING)
+    threading.Thread(target=_end_with_parent, daemon=True).start()
     try:
         while True:
             connection.send(_run(connection.recv()))
     except (EOFError, ConnectionError):
         pass
+
+
+def _end_with_parent() -> None:
+    """End this process and what it started as soon as the one that started it is gone."""
+    parent = multiprocessing.parent_process()
+    if parent is not None:
+        wait([parent.sentinel])
+        os.killpg(os.getpgrp(), signal.SIGKILL)
 
 
 def _run(job: Job) -> Outcome:

@@ -26,12 +26,15 @@ SIZE = (64, 48)
 # (0, 0) holds a command, the next four the true box.
 SCRIPTED = """
 import os
+from pathlib import Path
+import signal
+import subprocess
 import time
 
 from lmsco_ros.core import BoundingBox, TrackState
 from lmsco_ros.evaluation.trackers import Answer
 
-TRACK, MISS, LOSE, RAISE, DIE, REFUSE = range(6)
+TRACK, MISS, LOSE, RAISE, DIE, REFUSE, WAIT, END, MUMBLE = range(9)
 
 
 class Scripted:
@@ -47,6 +50,12 @@ class Scripted:
             raise RuntimeError('stumbled')
         if command == DIE:
             os._exit(7)
+        if command == END:
+            os.kill(os.getpid(), signal.SIGTERM)
+        if command == MUMBLE:
+            return 'somewhere'
+        if command == WAIT:
+            wait(Path(os.environ['SCRIPTED_GATE']))
         if command == MISS:
             x, y = 50, 40
         state = TrackState.LOST if command == LOSE else TrackState.TRACKING
@@ -54,6 +63,17 @@ class Scripted:
 
     def close(self):
         pass
+
+
+def wait(gate):
+    # Say who waits, a helper with it, until somebody opens the gate.
+    if not gate.exists():
+        helper = subprocess.Popen(['sleep', '1000'])
+        (gate.parent / f'waiting-{os.getpid()}-{helper.pid}').touch()
+        while not gate.exists():
+            time.sleep(0.01)
+        helper.kill()
+        helper.wait()
 """
 
 

@@ -14,6 +14,9 @@
 
 """The two commands, from the command line to the files they leave."""
 
+import json
+
+import cv2
 import pytest
 import typer
 from typer.testing import CliRunner
@@ -103,18 +106,80 @@ def test_sequences_and_frames_narrow_the_work_of_a_preset(lmsco, dataset, tmp_pa
     assert 'torn' not in result.output
 
 
-@pytest.mark.parametrize(('words', 'reason'), [
+def test_damage_is_told_and_made_good(lmsco, dataset, scripted, tmp_path):
+    output, page = tmp_path / 'out', tmp_path / 'page.md'
+    common = ('evaluate', dataset, '--tracker', scripted, '--output', output)
+    assert lmsco(*common).exit_code == 0
+    (record,) = output.rglob('*steady*.json')
+    sound = json.loads(record.read_text(encoding='utf-8'))
+    record.write_bytes(b'')
+    (output / 'run-ope.json').write_text('{')
+    (output / 'run-vot.json').write_text('{')
+    told = lmsco('results', output, '--page', page)
+    assert told.exit_code == 1 and not page.exists() and 'Traceback' not in told.output
+    assert f'{output}/run-ope.json is damaged' in told.output and 'again' in told.output
+    again = lmsco(*common)
+    assert again.exit_code == 0, again.output
+    assert f'{record} is damaged' in again.output and 'it is made again' in again.output
+    assert '1 results are there already, 1 to go' in again.output
+    assert f'not in the report: {output}/run-vot.json is damaged' in again.output
+    assert '--protocol vot' in again.output
+    assert json.loads(record.read_text(encoding='utf-8'))['boxes'] == sound['boxes']
+    assert lmsco(*common, '--protocol', 'vot').exit_code == 0
+    assert lmsco('results', output, '--page', page).exit_code == 0
+    assert 'VOT supervised' in page.read_text(encoding='utf-8')
+
+
+MISTAKES = [
     (('--tracker', 'nobody'), 'there is no tracker'),
-    (('--sequences', 'nothing'), 'no usable sequence'),
+    (('--tracker', 'python:math:sqrt'), 'python:math:sqrt cannot be built: TypeError'),
+    (('--tracker', 'python:os:getcwd'), 'is no tracker: what it returns has no initialize, up'),
+    (('--tracker', 'python:no_such:Module'), 'cannot be imported'),
+    (('--tracker', 'python:math:Tracker'), 'cannot be imported'),
+    (('--tracker', 'python::'), 'python:: cannot be built'),
+    (('--tracker', 'trax:mine=/no/such/program'), "there is no program '/no/such/program'"),
+    (('--tracker', "trax:mine='"), 'no command line that can be read'),
+    (('--tracker', 'vit:{folder}/data/vot_tir/rough/groundtruth.txt'), 'cannot use the model'),
+    (('--sequences', 'stedy'), "matches 'stedy'; near are steady; a pattern is"),
+    (('--sequences', '*/nothing'), 'there are vot_tir/rough, vot_tir/steady, vot_tir/torn; a'),
     (('--split', 'test'), 'no sequence of this dataset'),
     (('--challenge', 'fog'), "there is no challenge 'fog'; known are"),
-    (('--challenge', 'leave'), 'no sequence is left to evaluate'),
-])
+]
+
+
+@pytest.mark.parametrize(('words', 'reason'), MISTAKES)
 def test_mistakes_are_told_in_one_line(lmsco, dataset, scripted, tmp_path, words, reason):
     trackers = () if '--tracker' in words else ('--tracker', scripted)
+    words = [word.format(folder=tmp_path) for word in words]
     result = lmsco('evaluate', dataset, '--output', tmp_path / 'out', *trackers, *words)
-    assert result.exit_code == 1
+    assert result.exit_code == 2, result.output
     assert reason in result.output and 'Traceback' not in result.output
+    assert len(result.output.splitlines()) == 1
+    assert not (tmp_path / 'out').exists()
+
+
+@pytest.mark.parametrize('attribute', ['TrackerCSRT', 'TrackerKCF'])
+def test_trackers_of_the_contrib_build_are_missed_in_one_line(
+        lmsco, dataset, tmp_path, monkeypatch, attribute):
+    monkeypatch.delattr(cv2, attribute, raising=False)
+    result = lmsco('evaluate', dataset, '--output', tmp_path / 'out',
+                   '--tracker', attribute[len('Tracker'):].lower())
+    assert result.exit_code == 2
+    assert 'pip install "lmsco_ros[peers]"' in result.output
+    assert len(result.output.splitlines()) == 1
+
+
+def test_a_dataset_that_is_none_is_misuse(lmsco, scripted, tmp_path):
+    for dataset, reason in ((tmp_path / 'missing', 'is not a folder'),
+                            (tmp_path, 'holds no sequence')):
+        result = lmsco('evaluate', dataset, '--tracker', scripted, '--output', tmp_path / 'out')
+        assert result.exit_code == 2 and reason in result.output
+
+
+def test_nothing_left_to_evaluate_is_a_failure(lmsco, dataset, scripted, tmp_path):
+    result = lmsco('evaluate', dataset, '--tracker', scripted, '--output', tmp_path / 'out',
+                   '--challenge', 'leave')
+    assert result.exit_code == 1 and 'no sequence is left to evaluate' in result.output
 
 
 def test_results_of_nothing_is_an_error(lmsco, tmp_path):

@@ -174,7 +174,7 @@ def reason(root):
 @pytest.mark.parametrize(('name', 'content', 'complaint'), [
     ('absence.label', '0 1', 'absence.label has 2 values for 3 frames'),
     ('out_of_view.txt', '0,1,0,0', 'out_of_view.txt has 4 values for 3 frames'),
-    ('full_occlusion.txt', '0,2,0', "full_occlusion.txt holds '2'; expected one number from 0 to 1"),
+    ('full_occlusion.txt', '0,2,0', "holds '2'; expected one number from 0 to 1 a frame"),
     ('cover.label', '8 9 1', "cover.label holds '9'; expected one number from 0 to 8"),
     ('occlusion.tag', '0 1 0 0', 'occlusion.tag has 4 values for 3 frames'),
 ])

@@ -157,7 +157,7 @@ def test_command_can_be_repeated(runs):
 
 
 def test_results_page_has_a_table_for_each_kind_of_scene(tmp_path, runs):
-    from lmsco_ros.evaluation.record_store import write_json
+    from lmsco_ros.evaluation.whole_file import write_json
     for protocol, run in runs.items():
         for name, traces in run.traces.items():
             for info, trace in zip(run.sequences, traces):

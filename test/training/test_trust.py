@@ -14,12 +14,13 @@
 
 """What the trust in a detection is fitted to, and the fit."""
 
+import cv2
 import numpy as np
 import pytest
 
 from lmsco_ros.core import TrackerConfig
 from lmsco_ros.evaluation.datasets import TrackingSequence
-from training.trust import fit, record, Records, separation
+from training.trust import fit, main, record, Records, separation
 
 ABSENT = range(12, 18)
 
@@ -58,3 +59,21 @@ def test_fit_separates_what_can_be_separated():
     assert weights[1] > 3 * max(abs(weights[0]), abs(weights[2]))
     assert separation(records, [0, 1, 2], weights) > 0.98
     assert separation(records, [0], weights[[0, 3]]) < 0.7
+
+
+@pytest.mark.parametrize(('words', 'reason'), [
+    (('--data', '{folder}/missing'), 'missing holds no folder thermal_dev'),
+    (('--data', '{folder}/empty'), 'holds no sequence'),
+    (('--data', '{folder}/other'), "no sequence of this dataset is in part 'train'"),
+    (('--data', '{folder}/empty', '--frames', '1'), 'at least 2 are needed'),
+])
+def test_data_that_is_not_there_is_told_in_a_line(tmp_path, capsys, words, reason):
+    (tmp_path / 'empty' / 'thermal_dev').mkdir(parents=True)
+    other = tmp_path / 'other' / 'thermal_dev' / 'group' / 'clip'
+    other.mkdir(parents=True)
+    cv2.imwrite(str(other / '1.png'), np.zeros((20, 20), np.uint8))
+    (other / 'groundtruth.txt').write_text('1,2,3,4')
+    with pytest.raises(SystemExit) as end:
+        main([word.format(folder=tmp_path) for word in words])
+    assert end.value.code == 2
+    assert reason in capsys.readouterr().err.splitlines()[-1]

@@ -26,7 +26,7 @@ from lmsco_ros.evaluation.challenges.presence import cut, disappear, twin
 from lmsco_ros.evaluation.challenges.sensor import (
     dead_pixels, gain_jump, no_value, polarity, shutter, sixteen_bit, telemetry)
 from lmsco_ros.evaluation.datasets import TrackingSequence
-from lmsco_ros.evaluation.errors import DatasetError
+from lmsco_ros.evaluation.errors import RequestError
 
 
 @dataclass(frozen=True)
@@ -75,14 +75,14 @@ def challenge_names(names: list[str]) -> tuple[str, ...]:
 
     Raises
     ------
-    DatasetError
+    RequestError
         When one is unknown.
 
     """
     chosen: dict[str, None] = {}
     for name in names:
         if name != 'all' and name not in CHALLENGES:
-            raise DatasetError(f'there is no challenge {name!r}; known are '
+            raise RequestError(f'there is no challenge {name!r}; known are '
                                f'{", ".join(CHALLENGES)} and all')
         chosen.update(dict.fromkeys(CHALLENGES if name == 'all' else [name]))
     return tuple(chosen)

@@ -23,7 +23,7 @@ from typing import Iterable, Iterator, Union
 from lmsco_ros.evaluation.datasets.frames import image_folder
 from lmsco_ros.evaluation.datasets.layouts import FRAME_FOLDERS, Plan, READERS
 from lmsco_ros.evaluation.datasets.sequence import TrackingSequence
-from lmsco_ros.evaluation.errors import DatasetError, SequenceError
+from lmsco_ros.evaluation.errors import RequestError, SequenceError
 
 _MAX_DEPTH = 3
 _UNTOLD = ('frames without ground truth; expected groundtruth.txt, groundtruth_rect.txt, '
@@ -63,15 +63,15 @@ def scan_dataset(root: Path) -> DatasetScan:
 
     Raises
     ------
-    DatasetError
+    RequestError
         When there is no such folder, or nothing in it looks like a sequence.
 
     """
     if not root.is_dir():
-        raise DatasetError(f'{root} is not a folder; give the folder of a dataset')
+        raise RequestError(f'{root} is not a folder; give the folder of a dataset')
     found = list(_told_apart(_walk(root.resolve(), _MAX_DEPTH)))
     if not found:
-        raise DatasetError(
+        raise RequestError(
             f'{root} holds no sequence; expected folders with groundtruth.txt, '
             'groundtruth_rect.txt or IR_label.json beside frames or a video, or anno/ and '
             'frames/ (docs/datasets.md)')

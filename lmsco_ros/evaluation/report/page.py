@@ -29,6 +29,7 @@ import numpy as np
 
 from lmsco_ros.evaluation.challenges import CHALLENGES
 from lmsco_ros.evaluation.datasets import TrackingSequence
+from lmsco_ros.evaluation.record_store import file_name
 from lmsco_ros.evaluation.report.conditions import conditions, problems
 from lmsco_ros.evaluation.report.failures import worst_failures
 from lmsco_ros.evaluation.report.formatting import number, spread_warning
@@ -46,6 +47,7 @@ from lmsco_ros.evaluation.summaries.confidence import confidence_parts, summariz
 from lmsco_ros.evaluation.summaries.differences import differences
 from lmsco_ros.evaluation.summaries.one_pass import summarize_one_pass
 from lmsco_ros.evaluation.summaries.supervised import eao_interval, summarize_supervised
+from lmsco_ros.evaluation.whole_file import write_whole
 
 _TITLE = 'Thermal tracking evaluation'
 
@@ -82,7 +84,6 @@ def write_report(output: Path, runs: Mapping[str, EvaluationRun],
     main = runs.get('ope') or runs['vot']
     caution = spread_warning(len(main.sequences))
     pictures = output / 'pictures'
-    pictures.mkdir(parents=True, exist_ok=True)
     trackers = dict.fromkeys(name for run in runs.values() for name in run.trackers)
     colors = {name: look.color for name, look in looks(trackers).items()}
     page = _template().render(
@@ -94,7 +95,7 @@ def write_report(output: Path, runs: Mapping[str, EvaluationRun],
         failures=list(_failures(main, sequences, colors, pictures)),
         **_sequence_table(runs, sequences))
     path = output / 'report.html'
-    path.write_text(page, encoding='utf-8')
+    write_whole(path, page.encode())
     return path
 
 
@@ -215,8 +216,8 @@ def _failures(run: EvaluationRun, sequences: Mapping[str, TrackingSequence],
             trace = run.traces[failure.tracker][failure.sequence]
             strip = failure_strip(images.frames, info.ground_truth, trace.boxes, failure.frames,
                                   colors[failure.tracker])
-            name = f'failure_{failure.tracker}_{info.group}_{info.name}.png'
-            (folder / name).write_bytes(encode(strip, '.png'))
+            name = file_name(f'failure_{failure.tracker}_{info.group}_{info.name}.png')
+            write_whole(folder / name, encode(strip, '.png'))
             yield {'tracker': failure.tracker, 'sequence': info.full_name,
                    'overlap': number(failure.mean_overlap),
                    'picture': _uri(encode(strip, '.jpg'), 'jpeg')}
@@ -227,7 +228,7 @@ def _save_plots(figures: Mapping[str, Figure], folder: Path) -> list[dict[str, s
     for name, figure in figures.items():
         stream = BytesIO()
         figure.savefig(stream, format='png')
-        (folder / f'{name}.png').write_bytes(stream.getvalue())
+        write_whole(folder / f'{name}.png', stream.getvalue())
         items.append({'name': name.replace('_', ' '),
                       'source': _uri(stream.getvalue(), 'png')})
     return items

@@ -158,7 +158,20 @@ class OpenCVSpec:
             files = ','.join(f'{model}.onnx' for model in recipe.models)
             raise TrackerError(f'tracker {self.name!r} needs its model files; '
                                f'name it as {self.name}:{files} with your paths')
-        return OpenCVTracker(self._creator(kind, recipe), recipe.smallest_side)
+        create = self._creator(kind, recipe)
+        if recipe.models:
+            self._try(create)
+        return OpenCVTracker(create, recipe.smallest_side)
+
+    def _try(self, create: Callable[[], Any]) -> None:
+        """Raise `TrackerError` where OpenCV cannot use the model files."""
+        try:
+            create()
+        except (cv2.error, TypeError) as error:
+            files = ', '.join(str(path) for path in self.models)
+            reason = str(error).strip().splitlines()[-1]
+            raise TrackerError(f'tracker {self.name!r}: OpenCV cannot use the model files '
+                               f'{files} ({reason}); give the ONNX files made for it') from error
 
     def _creator(self, kind: Any, recipe: _Recipe) -> Callable[[], Any]:
         if not recipe.models:

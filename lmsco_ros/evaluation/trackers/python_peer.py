@@ -19,10 +19,16 @@ from __future__ import annotations
 from dataclasses import dataclass
 import importlib
 from pathlib import Path
+from typing import Any
 
 from lmsco_ros.evaluation.errors import TrackerError
 from lmsco_ros.evaluation.trackers.code_version import sources_digest
 from lmsco_ros.evaluation.trackers.interface import Tracker
+
+_METHODS = ('initialize', 'update', 'close')
+_EXPECTED = ('a class, or a function without arguments, whose result has initialize(image, box), '
+             'update(image), close() and in_process, as in '
+             'lmsco_ros.evaluation.trackers.Tracker')
 
 
 @dataclass(frozen=True)
@@ -53,9 +59,28 @@ class PythonSpec:
         return f'{self.module}:{self.factory} {digest}'
 
     def build(self) -> Tracker:
-        """Import and call the factory."""
+        """Import and call the factory, or raise `TrackerError` saying what it lacks."""
+        tracker = self._made()
+        missing = [name for name in _METHODS if not callable(getattr(tracker, name, None))]
+        missing += [] if hasattr(tracker, 'in_process') else ['in_process']
+        if missing:
+            raise TrackerError(
+                f'{self._text} is no tracker: what it returns has no {", ".join(missing)}; '
+                f'expected {_EXPECTED}')
+        return tracker
+
+    def _made(self) -> Any:
+        """Return what the factory makes; any error of a user's own code becomes one of ours."""
         try:
             return getattr(importlib.import_module(self.module), self.factory)()
         except (ImportError, AttributeError) as error:
-            raise TrackerError(f'tracker {self.module}:{self.factory} cannot be imported: '
-                               f'{error}; expected module:callable') from error
+            raise TrackerError(f'{self._text} cannot be imported: {error}; expected '
+                               f'python:MODULE:CALLABLE, {_EXPECTED}') from error
+        except (Exception, SystemExit) as error:
+            reason = ' '.join(str(error).split())
+            raise TrackerError(f'{self._text} cannot be built: {type(error).__name__}: {reason}; '
+                               f'expected {_EXPECTED}') from error
+
+    @property
+    def _text(self) -> str:
+        return f'tracker python:{self.module}:{self.factory}'

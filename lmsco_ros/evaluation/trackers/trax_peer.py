@@ -25,6 +25,7 @@ import hashlib
 import importlib
 import math
 import shlex
+import shutil
 import subprocess
 from typing import Any, Optional
 
@@ -149,7 +150,15 @@ class TraxSpec:
         return f'trax {hashlib.sha256(self.command.encode()).hexdigest()[:12]}'
 
     def build(self) -> TraxTracker:
-        """Return a client; the server starts with the first target."""
+        """Return a client, or raise `TrackerError`; the server starts with the first target."""
+        try:
+            program = shlex.split(self.command)[0]
+        except (ValueError, IndexError) as error:
+            raise TrackerError(f'tracker trax:{self.name}={self.command} has no command line that '
+                               'can be read; expected trax:NAME=COMMAND') from error
+        if shutil.which(program) is None:
+            raise TrackerError(f'TraX tracker {self.name!r}: there is no program {program!r}; '
+                               'give its path, or make it executable')
         return TraxTracker(self.command)
 
 
