@@ -155,7 +155,9 @@ class _Worker:
 def _serve(connection: Connection) -> None:
     """Answer jobs until the other side hangs up."""
     os.setsid()
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    # Who says that all is to end says it to the other side too, which ends this one.
+    for number in (signal.SIGINT, signal.SIGHUP):
+        signal.signal(number, signal.SIG_IGN)
     signal.pthread_sigmask(signal.SIG_UNBLOCK, _ENDING)
     threading.Thread(target=_end_with_parent, daemon=True).start()
     try:
