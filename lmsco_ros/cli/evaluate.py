@@ -56,7 +56,8 @@ def register(app: typer.Typer) -> None:
 def evaluate(
     dataset: Annotated[Path, typer.Argument(
         show_default=False,
-        help='Folder of a VOT, OTB, PTB-TIR, LSOTB-TIR, Anti-UAV or video dataset.')],
+        help='Folder of a VOT, OTB, PTB-TIR, LSOTB-TIR, LaSOT, GOT-10k, TrackingNet, Anti-UAV or '
+             'video dataset; docs/datasets.md shows them.')],
     output: Annotated[Path, typer.Option(
         file_okay=False, show_default=False,
         help='Folder for records, plots and report.html; finished work in it is kept.')],

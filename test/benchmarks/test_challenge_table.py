@@ -22,9 +22,9 @@ from benchmarks.plain_intensity import first_range, min_max
 from lmsco_ros.core import BoundingBox, LMSCOTracker, track
 from lmsco_ros.core.imaging.gain import AutomaticGain
 from lmsco_ros.evaluation.errors import DatasetError
-from lmsco_ros.evaluation.whole_file import write_json
 from lmsco_ros.evaluation.run_file import SequenceInfo, write_run
 from lmsco_ros.evaluation.trace import Trace
+from lmsco_ros.evaluation.whole_file import write_json
 
 
 def evaluation(folder, challenge, lost):
