@@ -137,8 +137,6 @@ MISTAKES = [
     (('--tracker', 'python:no_such:Module'), 'cannot be imported'),
     (('--tracker', 'python:math:Tracker'), 'cannot be imported'),
     (('--tracker', 'python::'), 'python:: cannot be built'),
-    (('--tracker', 'trax:mine=/no/such/program'), "there is no program '/no/such/program'"),
-    (('--tracker', "trax:mine='"), 'no command line that can be read'),
     (('--tracker', 'vit:{folder}/data/vot_tir/rough/groundtruth.txt'), 'cannot use the model'),
     (('--sequences', 'stedy'), "matches 'stedy'; near are steady; a pattern is"),
     (('--sequences', '*/nothing'), 'there are vot_tir/rough, vot_tir/steady, vot_tir/torn; a'),

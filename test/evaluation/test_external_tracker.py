@@ -78,3 +78,13 @@ def test_the_missing_library_is_named_with_its_remedy(monkeypatch):
     monkeypatch.setitem(sys.modules, 'trax', None)
     with pytest.raises(TrackerError, match='pip install'):
         resolve(f'trax:any={os.devnull}').build()
+
+
+@pytest.mark.parametrize(('command', 'reason'), [
+    ('/no/such/program --fast', "'any': there is no program '/no/such/program'"),
+    ("'", 'no command line that can be read'), ('', 'no command line that can be read'),
+])
+def test_a_server_that_cannot_start_is_told_before_anything_runs(command, reason):
+    pytest.importorskip('trax', reason='needs the extra [vot]')
+    with pytest.raises(TrackerError, match=reason):
+        resolve(f'trax:any={command}').build()

@@ -151,6 +151,7 @@ class TraxSpec:
 
     def build(self) -> TraxTracker:
         """Return a client, or raise `TrackerError`; the server starts with the first target."""
+        client = TraxTracker(self.command)
         try:
             program = shlex.split(self.command)[0]
         except (ValueError, IndexError) as error:
@@ -159,7 +160,7 @@ class TraxSpec:
         if shutil.which(program) is None:
             raise TrackerError(f'TraX tracker {self.name!r}: there is no program {program!r}; '
                                'give its path, or make it executable')
-        return TraxTracker(self.command)
+        return client
 
 
 def _state(word: Optional[str], box: Optional[BoundingBox]) -> TrackState:
