@@ -74,7 +74,7 @@ def track(
 
         settings = load_config(preset, config)
         images = open_source(source, topic=topic)
-        truth = _read_truth(ground_truth)
+        truth = _read_truth(ground_truth, len(images))
         start = _start_box(init, truth)
         outputs = RunOutputs(folder, images.fps, overwrite=overwrite,
                              title=f'{_title(source)}  ·  {config.stem if config else preset}')
@@ -83,7 +83,7 @@ def track(
         say(f'boxes.csv, overlay.mp4 and summary.png are in {folder}')
 
 
-def _read_truth(path: Optional[Path]) -> list[Optional[BoundingBox]]:
+def _read_truth(path: Optional[Path], frames: int) -> list[Optional[BoundingBox]]:
     """Return the true boxes, None where the target is absent; empty without a file."""
     from lmsco_ros.core import BoundingBox
     from lmsco_ros.evaluation.datasets.boxes_text import read_boxes
@@ -91,7 +91,9 @@ def _read_truth(path: Optional[Path]) -> list[Optional[BoundingBox]]:
 
     if path is None:
         return []
-    rows = read_boxes(path)
+    rows = read_boxes(path, frames)
+    if len(rows) != frames:
+        warn(f'{path.name} has {len(rows)} rows for {frames} frames; compared is what has both')
     return [None if absent else BoundingBox(*map(float, row))
             for row, absent in zip(rows, is_absent(rows))]
 

@@ -134,13 +134,14 @@ def test_killed_evaluation_goes_on_where_it_was(evaluations):
     whole(evaluations)
 
 
-@pytest.mark.parametrize('number', [signal.SIGINT], ids=lambda number: number.name)
+@pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM, signal.SIGHUP],
+                         ids=lambda number: number.name)
 def test_ended_evaluation_keeps_what_was_finished_and_says_so(evaluations, number):
     first = evaluations.start()
     workers = evaluations.waiting()
     os.killpg(first.pid, number)
     said, _ = first.communicate()
-    assert first.returncode != 0 and 'Traceback' not in said
+    assert first.returncode == 128 + number and 'Traceback' not in said
     assert f'1 of 2 results are kept in {evaluations.output}' in ' '.join(said.split())
     assert 'the same command goes on from there' in ' '.join(said.split())
     until(lambda: not any(map(lives, workers)))
