@@ -16,6 +16,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import Any
 
@@ -80,7 +81,7 @@ def _blob_array(blob: Any, path: Path, name: str) -> np.ndarray:
     shape = (tuple(blob.shape.dim) if blob.HasField('shape')
              else (blob.num, blob.channels, blob.height, blob.width))
     numbers = np.array(blob.double_data or blob.data, np.float32)
-    if numbers.size != np.prod(shape, dtype=np.int64):
+    if min(shape, default=0) < 0 or numbers.size != math.prod(shape):
         raise WeightsError(f'{path}: array {name} has {numbers.size} numbers for the shape '
                            f'{shape}; the file is damaged, get it again')
     return numbers.reshape(shape)

@@ -23,35 +23,49 @@ import numpy as np
 from scipy.io import loadmat
 
 from lmsco_ros.core.errors import WeightsError
+from lmsco_ros.core.weights.matlab_file import FileTooLarge, unfold
 
 __all__ = ['read_matconvnet']
 
+# Version 2 of the format, in either byte order: HDF5 inside.
+_NEWER = (b'\x00\x02', b'\x02\x00')
 
-def read_matconvnet(path: Path) -> dict[str, np.ndarray]:
+
+def read_matconvnet(path: Path, limit: int) -> dict[str, np.ndarray]:
     """
     Return kernels (out, in, kh, kw), biases (out,) and, where it is told, the mean (3,).
 
     Both generations are read: layers with a cell `weights` and those with `filters` and
     `biases`; the network itself, or a variable `net` that holds it.
 
+    Parameters
+    ----------
+    path : Path
+        The file.
+    limit : int
+        Bytes that it unfolds to at most.
+
     Raises
     ------
     WeightsError
-        When the file is damaged, of MATLAB 7.3, or holds no layers.
+        When the file is damaged, of MATLAB 7.3, holds no layers, or more than the limit.
 
     """
-    with path.open('rb') as file:
-        try:
-            return _network_arrays(loadmat(file), path)
-        except NotImplementedError as error:
-            raise WeightsError(f'{path} is a file of MATLAB 7.3 or newer; load it there and save '
-                               'it with the option -v7') from error
-        except WeightsError:
-            raise
-        # The library raises whatever the damage of a file makes it stumble over.
-        except Exception as error:
-            raise WeightsError(f'{path} is damaged, or no MATLAB file with a network of '
-                               f'MatConvNet ({error}); get it again') from error
+    content = path.read_bytes()
+    if content[124:126] in _NEWER:
+        raise WeightsError(f'{path} is a file of MATLAB 7.3 or newer; load it there and save it '
+                           'with the option -v7')
+    try:
+        return _network_arrays(loadmat(unfold(content, limit)), path)
+    except WeightsError:
+        raise
+    except FileTooLarge as error:
+        raise WeightsError(f'{path} holds more than the {limit} bytes that are read of a network '
+                           f'({error}); get it again') from error
+    # The library raises whatever the damage of a file makes it stumble over.
+    except Exception as error:
+        raise WeightsError(f'{path} is damaged, or no MATLAB file with a network of '
+                           f'MatConvNet ({error}); get it again') from error
 
 
 def _network_arrays(content: dict[str, Any], path: Path) -> dict[str, np.ndarray]:

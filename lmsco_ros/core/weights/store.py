@@ -27,7 +27,8 @@ import platformdirs
 from lmsco_ros.core.errors import WeightsError
 from lmsco_ros.core.networks.backbone import Backbone
 from lmsco_ros.core.weights.download import download, file_sha256, Progress
-from lmsco_ros.core.weights.formats import read_about, read_arrays, READERS, write_arrays
+from lmsco_ros.core.weights.formats import (
+    declared_arrays, read_about, read_arrays, READERS, write_arrays)
 from lmsco_ros.core.weights.registry import find_source, WeightsSource
 
 __all__ = ['DIRECTORY_VARIABLE', 'Verification', 'fetch_weights', 'find_file', 'fitting_arrays',
@@ -92,7 +93,7 @@ def load_backbone(name: str, directory: Path | None = None) -> Backbone:
     """
     source = find_source(name)
     path = find_file(source, directory)
-    return source.architecture.from_arrays(fitting_arrays(source, read_arrays(path), path))
+    return source.architecture.from_arrays(_read_fitting(source, path))
 
 
 def locate(source: WeightsSource, directory: Path | None = None) -> Path | None:
@@ -161,7 +162,7 @@ def import_weights(file: Path, name: str, directory: Path | None = None) -> Path
     if file.name == source.file_name and source.sha256 not in (None, found):
         raise WeightsError(f'{file} has the SHA-256 checksum {found}, expected {source.sha256}; '
                            'it is damaged or was changed: get it again')
-    arrays = fitting_arrays(source, read_arrays(file), file)
+    arrays = _read_fitting(source, file)
     path = weights_directory(directory) / f'{source.name}.safetensors'
     write_arrays(path, arrays, {'weights': source.name, 'source_file': file.name,
                                 'source_sha256': found})
@@ -224,7 +225,7 @@ def verify_weights(name: str, directory: Path | None = None) -> Verification:
     """
     source = find_source(name)
     path = find_file(source, directory)
-    arrays = fitting_arrays(source, read_arrays(path), path)
+    arrays = _read_fitting(source, path)
     found = (file_sha256(path) if path.name == source.file_name
              else read_about(path).get('source_sha256'))
     if None not in (found, source.sha256) and found != source.sha256:
@@ -253,20 +254,36 @@ def fitting_arrays(source: WeightsSource, arrays: Mapping[str, np.ndarray],
         When an array is missing, has another shape, or holds other than finite numbers.
 
     """
-    named = source.architecture.own_names(arrays)
-    remedy = (f'this is not the network of {source.file_name}; '
-              f'get that file and run `lmsco weights import FILE --as {source.name}`')
     fitting = {}
-    for name, shape in source.architecture.file_shapes().items():
-        if name not in named:
-            raise WeightsError(f'{path} has no array {name} of shape {shape}, which '
-                               f'{source.name} needs: {remedy}')
-        array = named[name]
-        if array.shape != shape:
-            raise WeightsError(f'{path}: array {name} has shape {array.shape}, but '
-                               f'{source.name} needs {shape}: {remedy}')
+    for name, array in _matching(source, arrays, path).items():
         if not np.issubdtype(array.dtype, np.floating) or not np.isfinite(array).all():
             raise WeightsError(f'{path}: array {name} of type {array.dtype} holds other than '
                                'finite real numbers; the file is damaged, get it again')
         fitting[name] = np.ascontiguousarray(array, np.float32)
     return fitting
+
+
+def _read_fitting(source: WeightsSource, path: Path) -> dict[str, np.ndarray]:
+    """Return the arrays of a network; what the file declares is checked before it is read."""
+    declared = declared_arrays(path)
+    if declared is not None:
+        _matching(source, declared, path)
+    return fitting_arrays(source, read_arrays(path), path)
+
+
+def _matching(source: WeightsSource, arrays: Mapping[str, np.ndarray],
+              path: Path) -> dict[str, np.ndarray]:
+    """Return the arrays that the network needs, of the right names and shapes."""
+    named = source.architecture.own_names(arrays)
+    remedy = (f'this is not the network of {source.file_name}; '
+              f'get that file and run `lmsco weights import FILE --as {source.name}`')
+    matching = {}
+    for name, shape in source.architecture.file_shapes().items():
+        if name not in named:
+            raise WeightsError(f'{path} has no array {name} of shape {shape}, which '
+                               f'{source.name} needs: {remedy}')
+        if named[name].shape != shape:
+            raise WeightsError(f'{path}: array {name} has shape {named[name].shape}, but '
+                               f'{source.name} needs {shape}: {remedy}')
+        matching[name] = named[name]
+    return matching

@@ -15,6 +15,10 @@
 """Every published format gives back what was written, and damaged files are refused."""
 
 import os
+import struct
+import tracemalloc
+import zipfile
+import zlib
 
 import numpy as np
 import pytest
@@ -22,7 +26,8 @@ from scipy.io import savemat
 import torch
 
 from lmsco_ros.core.errors import WeightsError
-from lmsco_ros.core.weights.formats import read_about, read_arrays, write_arrays
+from lmsco_ros.core.weights.formats import (
+    declared_arrays, read_about, read_arrays, write_arrays)
 
 
 @pytest.fixture
@@ -146,3 +151,143 @@ def test_half_a_conversion_leaves_nothing(tmp_path, arrays):
     with pytest.raises(TypeError):
         write_arrays(path, arrays, {'number': 3})
     assert list(path.parent.iterdir()) == []
+
+
+MANY = 40_000_000
+"""Numbers of a bomb, which a careless reader would unfold to 160 MB."""
+
+
+def npz_bomb(path):
+    with zipfile.ZipFile(path, 'w', zipfile.ZIP_DEFLATED) as archive:
+        with archive.open('conv1.weight.npy', 'w') as file:
+            np.lib.format.write_array_header_1_0(
+                file, {'descr': '<f4', 'fortran_order': False, 'shape': (MANY,)})
+            for _ in range(40):
+                file.write(bytes(4 * MANY // 40))
+
+
+def compressed_torch_bomb(path):
+    whole = path.with_suffix('.whole')
+    torch.save({'conv1.weight': torch.zeros(1)}, whole)
+    with zipfile.ZipFile(whole) as given, \
+            zipfile.ZipFile(path, 'w', zipfile.ZIP_DEFLATED) as archive:
+        for name in given.namelist():
+            content = given.read(name)
+            archive.writestr(name, bytes(4 * MANY) if name.endswith('data/0') else content)
+
+
+class Expanding:
+    """Pickled as a byte array of many zeros."""
+
+    def __reduce__(self):
+        return bytearray, (4 * MANY,)
+
+
+def element(kind, content):
+    """Return an element of a MATLAB file."""
+    return struct.pack('<II', kind, len(content)) + content + bytes(-len(content) % 8)
+
+
+def matlab_array(array_class, dimensions, rest=b''):
+    """Return a variable `layers` of a MATLAB file."""
+    return element(14, element(6, struct.pack('<II', array_class, 0))
+                   + element(5, struct.pack(f'<{len(dimensions)}i', *dimensions))
+                   + element(1, b'layers') + rest)
+
+
+def write_matlab(path, *variables):
+    path.write_bytes(b'MATLAB 5.0 MAT-file'.ljust(124) + b'\x00\x01IM' + b''.join(variables))
+
+
+def compressed(variable):
+    content = zlib.compress(variable)
+    return struct.pack('<II', 15, len(content)) + content
+
+
+def nested(depth):
+    variable = matlab_array(6, (0, 0), element(9, b''))
+    for _ in range(depth):
+        variable = matlab_array(1, (1, 1), variable)
+    return variable
+
+
+# Names of one letter: a file of 20 kB declares 20,000 structures with as many fields.
+FIELDS = element(5, struct.pack('<i', 1)) + element(1, b'a' * 20_000)
+BOMBS = {
+    'zeros.npz': npz_bomb,
+    'zeros.pth': compressed_torch_bomb,
+    'bytes.pth': lambda path: torch.save({'conv1.weight': Expanding()}, path),
+    'old_bytes.pth': lambda path: torch.save(
+        {'conv1.weight': Expanding()}, path, _use_new_zipfile_serialization=False),
+    'expanded.pt': lambda path: torch.save(
+        {'w': torch.zeros(1, dtype=torch.half).expand(MANY)}, path),
+    'zeros.mat': lambda path: write_matlab(
+        path, compressed(matlab_array(7, (MANY, 1), element(7, bytes(4 * MANY))))),
+    'cells.mat': lambda path: write_matlab(path, matlab_array(1, (MANY, 10))),
+    'structures.mat': lambda path: write_matlab(path, matlab_array(2, (20_000, 1), FIELDS)),
+    'text.mat': lambda path: write_matlab(path, matlab_array(4, (MANY, 1), element(4, b''))),
+    'negative.mat': lambda path: write_matlab(path, matlab_array(1, (-MANY, -2))),
+    'lying.mat': lambda path: write_matlab(path, struct.pack('<II', 14, 8)
+                                           + matlab_array(1, (MANY, 10))[8:]),
+    'deep.mat': lambda path: write_matlab(path, nested(2000)),
+}
+
+
+@pytest.mark.parametrize('name', BOMBS)
+def test_bombs_are_refused_before_they_unfold(tmp_path, name):
+    path = tmp_path / name
+    BOMBS[name](path)
+    assert path.stat().st_size < 1_000_000
+    tracemalloc.start()
+    try:
+        with pytest.raises(WeightsError, match=f'{path}.*(get it again|save network.state_dict)'):
+            read_arrays(path, 10_000_000)
+        assert tracemalloc.get_traced_memory()[1] < 60_000_000
+    finally:
+        tracemalloc.stop()
+
+
+def test_matlab_files_of_too_many_parts_are_refused(tmp_path, monkeypatch):
+    monkeypatch.setattr('lmsco_ros.core.weights.matlab_file._MOST_PARTS', 9)
+    cells = matlab_array(1, (4, 1), matlab_array(6, (0, 0), element(9, b'')) * 4)
+    write_matlab(tmp_path / 'many.mat', cells, compressed(cells))
+    with pytest.raises(WeightsError, match='more than 9 parts'):
+        read_arrays(tmp_path / 'many.mat')
+    write_matlab(tmp_path / 'few.mat', cells)
+    with pytest.raises(WeightsError, match='damaged, or no MATLAB file with a network'):
+        read_arrays(tmp_path / 'few.mat')
+
+
+@pytest.mark.parametrize('array_class, flags, numbers', [
+    (6, 0, 0), (6, 0x800, 1), (4, 0, 0), (5, 0, 2), (5, 0x800, 3)])
+def test_matlab_arrays_without_their_numbers_are_refused(tmp_path, array_class, flags, numbers):
+    # SciPy takes the next array for the numbers, and the process crashes.
+    lacking = matlab_array(array_class | flags, (0, 0), element(9, b'') * numbers)
+    write_matlab(tmp_path / 'lacking.mat', matlab_array(1, (4, 1), lacking * 4))
+    with pytest.raises(WeightsError, match='an array lacks its numbers'):
+        read_arrays(tmp_path / 'lacking.mat')
+
+
+def test_files_beyond_the_limit_are_refused(file_format, arrays, write_file):
+    path = write_file(file_format, arrays)
+    size = sum(array.nbytes for array in arrays.values())
+    with pytest.raises(WeightsError, match=f'{path} holds .*more than the'):
+        read_arrays(path, size)
+    assert read_arrays(path, 40 * size).keys() == arrays.keys()
+
+
+def test_archive_declares_its_arrays_before_they_are_read(tmp_path):
+    npz_bomb(tmp_path / 'zeros.npz')
+    (name, array), = declared_arrays(tmp_path / 'zeros.npz').items()
+    assert (name, array.shape, array.dtype, array.base.nbytes) == (
+        'conv1.weight', (MANY,), np.float32, 4)
+    assert declared_arrays(tmp_path / 'other.mat') is None
+
+
+def test_sparse_tensors_and_types_of_other_libraries_are_refused(tmp_path):
+    from safetensors.torch import save_file
+    torch.save({'w': torch.eye(3).to_sparse()}, tmp_path / 'sparse.pth')
+    save_file({'w': torch.zeros(3, dtype=torch.bfloat16)}, tmp_path / 'half.safetensors')
+    for name, reason in (('sparse.pth', 'more than tensors'), ('half.safetensors', 'bfloat16')):
+        with pytest.raises(WeightsError, match=reason):
+            read_arrays(tmp_path / name)

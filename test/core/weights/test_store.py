@@ -25,7 +25,7 @@ from lmsco_ros.core.networks.motion_cnn import MotionCNN
 from lmsco_ros.core.networks.squeezenet import SqueezeNet
 from lmsco_ros.core.networks.thermal import ThermalNet
 from lmsco_ros.core.networks.vgg_m import VGGM
-from lmsco_ros.core.weights import registry
+from lmsco_ros.core.weights import registry, store
 from lmsco_ros.core.weights.download import file_sha256
 from lmsco_ros.core.weights.formats import read_arrays, write_arrays
 from lmsco_ros.core.weights.store import (
@@ -229,3 +229,18 @@ def test_fetching_a_wrong_file_keeps_what_is_here(tmp_path, squeezenet, change_s
 def test_weights_without_an_address_cannot_be_fetched(tmp_path):
     with pytest.raises(WeightsError, match='no address .*; look at .* then run `lmsco'):
         fetch_weights('motion_cnn', tmp_path)
+
+
+def test_names_and_shapes_are_checked_before_an_archive_is_unfolded(tmp_path, monkeypatch,
+                                                                    random_arrays):
+    arrays = random_arrays(SqueezeNet)
+    right, wrong = tmp_path / 'right.npz', tmp_path / 'wrong.npz'
+    np.savez(right, **arrays)
+    np.savez(wrong, **{**arrays, 'conv1.bias': np.zeros(7, np.float32)})
+    np.savez(tmp_path / 'other.npz', junk=np.zeros(100))
+    import_weights(right, SQUEEZENET, tmp_path / 'weights')
+    monkeypatch.setattr(store, 'read_arrays', lambda path: pytest.fail('it was unfolded'))
+    for path, reason in ((wrong, r'conv1\.bias has shape \(7,\), but'),
+                         (tmp_path / 'other.npz', r'has no array conv1\.weight')):
+        with pytest.raises(WeightsError, match=reason):
+            import_weights(path, SQUEEZENET, tmp_path / 'weights')
