@@ -26,6 +26,7 @@ from scipy.io import savemat
 import torch
 
 from lmsco_ros.core.errors import WeightsError
+from lmsco_ros.core.weights import caffe_format
 from lmsco_ros.core.weights.formats import (
     declared_arrays, read_about, read_arrays, write_arrays)
 
@@ -291,3 +292,20 @@ def test_sparse_tensors_and_types_of_other_libraries_are_refused(tmp_path):
     for name, reason in (('sparse.pth', 'more than tensors'), ('half.safetensors', 'bfloat16')):
         with pytest.raises(WeightsError, match=reason):
             read_arrays(tmp_path / name)
+
+
+def test_other_members_of_an_archive_are_left_out(tmp_path):
+    np.savez(tmp_path / 'weights.npz', weight=np.ones(3))
+    with zipfile.ZipFile(tmp_path / 'weights.npz', 'a') as archive:
+        archive.writestr('README', 'about the weights')
+    assert list(read_arrays(tmp_path / 'weights.npz')) == ['weight']
+    assert list(declared_arrays(tmp_path / 'weights.npz')) == ['weight']
+
+
+def test_negative_shapes_are_refused(tmp_path):
+    network = caffe_format._network_message()()
+    blob = network.layer.add(name='conv1').blobs.add(data=[1.0] * 6)
+    blob.shape.dim.extend((-3, -2))
+    (tmp_path / 'negative.caffemodel').write_bytes(network.SerializeToString())
+    with pytest.raises(WeightsError, match=r'6 numbers for the shape \(-3, -2\)'):
+        read_arrays(tmp_path / 'negative.caffemodel')
