@@ -248,6 +248,14 @@ def test_bombs_are_refused_before_they_unfold(tmp_path, name):
         tracemalloc.stop()
 
 
+@pytest.mark.parametrize('name', ['zeros.pth', 'bytes.pth', 'old_bytes.pth'])
+def test_checkpoints_are_refused_before_pytorch_reads_them(tmp_path, monkeypatch, name):
+    BOMBS[name](tmp_path / name)
+    monkeypatch.setattr(torch, 'load', lambda *args, **kwargs: pytest.fail('it was read'))
+    with pytest.raises(WeightsError):
+        read_arrays(tmp_path / name, 10_000_000)
+
+
 def test_matlab_files_of_too_many_parts_are_refused(tmp_path, monkeypatch):
     monkeypatch.setattr('lmsco_ros.core.weights.matlab_file._MOST_PARTS', 9)
     cells = matlab_array(1, (4, 1), matlab_array(6, (0, 0), element(9, b'')) * 4)
