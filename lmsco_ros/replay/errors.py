@@ -14,6 +14,8 @@
 
 """Errors of sources and recordings: what was wrong, what was expected, what to do."""
 
+from lmsco_ros.media.errors import MediaWarning
+
 
 class ReplayError(ValueError):
     """Base of every error about recordings that a user can act on."""
@@ -29,3 +31,7 @@ class OutputError(ReplayError):
 
 class NodeError(ReplayError):
     """The node did not start, refused the target or stopped answering."""
+
+
+class SourceWarning(MediaWarning):
+    """A source was read otherwise than its reader may think; the text says how."""

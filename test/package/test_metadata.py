@@ -35,7 +35,8 @@ LIBRARIES = ('lmsco_ros', 'msg_adapters')
 # Installed from the package index where ROS 2 is: Ubuntu 24.04 has no package of them, or one that
 # is too old (protobuf).
 WITHOUT_ROSDEP_KEY = {
-    'array-api-compat', 'av', 'protobuf', 'rosbags', 'safetensors', 'threadpoolctl', 'torch'}
+    'array-api-compat', 'av', 'backports-zstd', 'lz4', 'protobuf', 'rosbags', 'safetensors',
+    'threadpoolctl', 'torch'}
 # The others are for evaluation against foreign code and stay out of the environment.
 INSTALLED_EXTRA = re.compile(r'extra == "(ros|test)"')
 ROSDEP_KEYS = {'opencv-python-headless': 'python3-opencv', 'pyyaml': 'python3-yaml'}
