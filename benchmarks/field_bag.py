@@ -46,8 +46,9 @@ from lmsco_ros.evaluation.run_file import EvaluationRun, SequenceInfo
 from lmsco_ros.evaluation.session import Request, select_sequences
 from lmsco_ros.evaluation.summaries.confidence import summarize_confidence
 from lmsco_ros.replay.bag_images import RAW
-from lmsco_ros.replay.bag_maker import create_bag, image_message
-from lmsco_ros.replay.bag_replay import MARKS_TOPIC, replay_bag, ReplayPlan
+from lmsco_ros.replay.bag_maker import image_message
+from lmsco_ros.replay.bag_replay import MARKS_TOPIC, Replay, ReplayPlan
+from lmsco_ros.replay.bags.output import BagOutput
 from lmsco_ros.replay.headers import header_at
 from lmsco_ros.replay.player import Exchange
 from lmsco_ros.replay.storage import Storage
@@ -65,7 +66,7 @@ COLUMNS = ('frames', 'answered', 'p50 ms', 'p95 ms', 'p99 ms', 'tracking', 'unce
 def write_bag(parts: Sequence[Part], path: Path) -> None:
     """Write images, and a mark for each part just before its first image."""
     store = get_typestore(Stores.ROS2_JAZZY)
-    with create_bag(path, Storage.MCAP) as writer:
+    with BagOutput(path, Storage.MCAP) as writer:
         images = writer.add_connection('/image_raw', RAW, typestore=store)
         marks = writer.add_connection(MARKS_TOPIC, MARK, typestore=store)
         index = 0
@@ -97,7 +98,7 @@ def play(bag: Path, output: Path, parameters: dict[str, object],
         if done % 900 == 0:
             print(f'{done} frames played', flush=True)
 
-    return replay_bag(plan, lambda total: None, on_frame)
+    return Replay(plan).run(lambda total: None, on_frame)
 
 
 def figures(parts: Sequence[SequenceInfo], answers: Sequence[Answers]) -> list[str]:

@@ -26,14 +26,14 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 import numpy as np
 import numpy.typing as npt
-from rosbags.highlevel import AnyReader
 
 from benchmarks.field_answers import Answers
 from benchmarks.joined_recording import FRAMES_PER_SECOND, stamp_of
 from lmsco_ros.evaluation.challenges.sensor import SHUTTER_EVERY, SHUTTER_FRAMES
 from lmsco_ros.evaluation.geometry import is_absent
 from lmsco_ros.evaluation.run_file import SequenceInfo
-from lmsco_ros.replay.bag_images import open_bag, serialized_stamp
+from lmsco_ros.replay.bags.reader import BagReader, open_bag
+from lmsco_ros.replay.bags.stamps import serialized_stamp
 from msg_adapters.image import image_from_message
 
 __all__ = ['chosen_moments', 'draw_sheet', 'Moment']
@@ -132,7 +132,7 @@ def _rows(parts: Sequence[SequenceInfo], answers: Sequence[Answers],
     return [row for event in sorted(rows) for row in rows[event][:_PARTS_PER_EVENT]]
 
 
-def _draw(panel: Axes, row: _Row, moment: Moment, reader: AnyReader) -> None:
+def _draw(panel: Axes, row: _Row, moment: Moment, reader: BagReader) -> None:
     """Draw what was drawn of a moment around the target, or around where it was last."""
     panel.set(xticks=[], yticks=[])
     found = _overlay(reader, stamp_of(row.first + moment.frame),
@@ -161,15 +161,15 @@ def _corner(box: npt.NDArray[np.float64], size: tuple[int, int]) -> tuple[float,
     return (float(np.clip(x, 0, size[0] - _SHOWN[0])), float(np.clip(y, 0, size[1] - _SHOWN[1])))
 
 
-def _overlay(reader: AnyReader, first: int, last: int) -> tuple[int, npt.NDArray[np.uint8]] | None:
+def _overlay(reader: BagReader, first: int, last: int) -> tuple[int, npt.NDArray[np.uint8]] | None:
     """Return the number of the first frame drawn between two stamps, and the drawing."""
-    connections = [item for item in reader.connections if item.topic == _OVERLAY]
-    for connection, _, data in reader.messages(connections, start=first):
+    channels = [item for item in reader.channels if item.topic == _OVERLAY]
+    for channel, _, data in reader.messages(channels, start=first):
         at = serialized_stamp(data)
         if at > last:
             return None
         if at >= first:
-            message = reader.deserialize(data, connection.msgtype)
+            message = reader.deserialize(data, channel.msgtype)
             index = round((at - stamp_of(0)) * FRAMES_PER_SECOND * 1e-9)
             return index, image_from_message(message)
     return None

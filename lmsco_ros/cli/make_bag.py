@@ -19,13 +19,17 @@ from __future__ import annotations
 from itertools import islice
 from pathlib import Path
 import time
-from typing import Annotated, Optional
+from typing import Annotated, Optional, TYPE_CHECKING
 
 import typer
 
-from lmsco_ros.cli.console import fail, frame_progress, MISUSED, plain_errors, say
+from lmsco_ros.cli.console import (
+    fail, frame_progress, MISUSED, plain_errors, say, telling_what_is_kept)
 from lmsco_ros.cli.options import FramesOption
 from lmsco_ros.replay.storage import Storage
+
+if TYPE_CHECKING:
+    from lmsco_ros.replay.bags.output import BagOutput
 
 
 def register(app: typer.Typer) -> None:
@@ -49,17 +53,22 @@ def make_bag(
 ) -> None:
     """Turn a folder of images or a video into a bag, to try the node on."""
     with plain_errors():
-        from lmsco_ros.replay import bag_maker
-        from lmsco_ros.replay.bag_images import is_bag
+        from lmsco_ros.replay.bag_maker import write_frames
+        from lmsco_ros.replay.bags.files import is_bag
+        from lmsco_ros.replay.bags.output import BagOutput
         from lmsco_ros.replay.sources import open_source
 
         if is_bag(source):
             fail(f'{source} is a bag already', MISUSED)
+        bag = BagOutput(output, storage)
         images = open_source(source, fps=fps or 0.0)
-        with frame_progress() as progress:
+        with telling_what_is_kept(lambda: _kept(bag, output)), frame_progress() as progress:
             total = min(len(images), frames or len(images))
-            count = bag_maker.make_bag(
+            count = write_frames(
                 progress.track(islice(images, frames), total=total, description='writing'),
-                output, topic=topic, frame_id=frame_id,
-                storage=storage, start_ns=time.time_ns())
+                bag, topic=topic, frame_id=frame_id, start_ns=time.time_ns())
     say(f'{count} frames on /{topic.lstrip("/")} are in {output}')
+
+
+def _kept(bag: BagOutput, output: Path) -> str:
+    return f'kept in {output}: a bag with {bag.count} frames' if bag.is_complete else ''

@@ -22,7 +22,8 @@ from typing import Annotated
 import typer
 
 from lmsco_ros.cli.configuration import load_config, node_parameters
-from lmsco_ros.cli.console import frame_progress, plain_errors, say, warn
+from lmsco_ros.cli.console import (
+    frame_progress, plain_errors, say, telling_what_is_kept, warn)
 from lmsco_ros.cli.options import (
     BagArgument, ConfigOption, FramesOption, InitOption, PresetOption, TopicOption)
 from lmsco_ros.cli.ros import require_ros
@@ -41,8 +42,8 @@ def replay(
         show_default=False, help='Folder of the new bag; it must not exist.')],
     topic: TopicOption = '',
     rate: Annotated[float, typer.Option(
-        min=0.0, help='Speed relative to the recording; 0: as fast as the node takes frames '
-                      'without losing one.')] = 1.0,
+        min=0.0, help='Speed relative to the recording, with pauses of a minute at most; 0: as '
+                      'fast as the node takes frames without losing one.')] = 1.0,
     preset: PresetOption = 'default',
     config: ConfigOption = None,
     frames: FramesOption = None,
@@ -56,7 +57,7 @@ def replay(
         require_ros()
         load_config(preset, config)
         from lmsco_ros.core import BoundingBox
-        from lmsco_ros.replay.bag_replay import replay_bag, ReplayPlan
+        from lmsco_ros.replay.bag_replay import Replay, ReplayPlan
 
         extra: tuple[str, ...] = ('marker', 'overlay', 'confidence_map') if images \
             else ('marker',)
@@ -64,14 +65,17 @@ def replay(
             bag=bag, output=output, storage=storage, box=BoundingBox(*init), topic=topic,
             rate=rate, frames=frames, outputs=extra,
             parameters=node_parameters(preset, config))
-        with frame_progress() as progress:
+        run = Replay(plan)
+        with telling_what_is_kept(lambda: run.kept), frame_progress() as progress:
             task = progress.add_task('replaying')
-            exchanges = replay_bag(
-                plan, lambda total: progress.update(task, total=total),
+            exchanges = run.run(
+                lambda total: progress.update(task, total=total),
                 lambda: progress.advance(task))
-    dropped = sum(exchange.latency is None for exchange in exchanges)
-    if dropped:
-        warn(f'the node dropped {dropped} of {len(exchanges)} frames because it was not done '
+    missing = sum(exchange.latency is None for exchange in exchanges)
+    if missing and rate:
+        warn(f'the node dropped {missing} of {len(exchanges)} frames because it was not done '
              'with earlier ones; use --rate 0 to track every frame')
-    say(f'{len(exchanges) - dropped} of {len(exchanges)} frames answered')
+    elif missing:
+        warn(f'the node left out {missing} of {len(exchanges)} frames; its log above may say why')
+    say(f'{len(exchanges) - missing} of {len(exchanges)} frames answered')
     say(f'original messages and answers are in {output}')

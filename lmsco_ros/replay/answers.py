@@ -23,7 +23,7 @@ from geometry_msgs.msg import PolygonStamped
 from rclpy.serialization import deserialize_message
 
 from lmsco_ros.core.types import BoundingBox
-from lmsco_ros.replay.bag_images import serialized_stamp
+from lmsco_ros.replay.bags.stamps import serialized_stamp
 from lmsco_ros.replay.node_session import Heard
 from msg_adapters.boxes import box_from_polygon
 from msg_adapters.status import FrameStatus, Level, status_from_message

@@ -12,70 +12,62 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Images of a rosbag2, sqlite3 or mcap, read without ROS."""
+"""Images of a bag, read without ROS."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
-import struct
-from typing import Any
+import warnings
 
-from rosbags.highlevel import AnyReader, AnyReaderError
-from rosbags.interfaces import Connection
-from rosbags.typesys import get_typestore, Stores
+import numpy.typing as npt
 
-from lmsco_ros.replay.errors import SourceError
+from lmsco_ros.replay.bags.channel import Channel
+from lmsco_ros.replay.bags.reader import BagReader, open_bag
+from lmsco_ros.replay.bags.stamps import header_stamp, ImageStamps
+from lmsco_ros.replay.errors import SourceError, SourceWarning
 from lmsco_ros.replay.frame import Frame
-from msg_adapters.errors import MessageError
 
 RAW, COMPRESSED = 'sensor_msgs/msg/Image', 'sensor_msgs/msg/CompressedImage'
-_BAG_SUFFIXES = ('.mcap', '.db3')
 _DEFAULT_FPS = 30.0
+# So many images at the beginning that cannot be decoded say that none can.
+_HOPELESS = 30
+_SKIPPED_TOLD = 3
 
 
-def is_bag(path: Path) -> bool:
-    """Tell whether `path` is a rosbag2: its folder, or a storage file."""
-    if path.is_dir():
-        return (path / 'metadata.yaml').is_file()
-    return path.suffix in _BAG_SUFFIXES
-
-
-@contextmanager
-def open_bag(path: Path) -> Iterator[AnyReader]:
+@dataclass(frozen=True)
+class ImageTopic:
     """
-    Open a bag for reading.
+    A topic of images in a bag.
 
-    Raises
-    ------
-    SourceError
-        When it is damaged or no bag.
+    Attributes
+    ----------
+    name : str
+        With the leading slash.
+    msgtype : str
+        RAW or COMPRESSED.
+    channels : tuple of Channel
+        All streams of the topic; several where recordings were joined or split.
 
     """
-    try:
-        reader = AnyReader([path], default_typestore=get_typestore(Stores.ROS2_JAZZY))
-        reader.open()
-    except (AnyReaderError, OSError) as error:
-        raise SourceError(f'{path} cannot be read as a bag ({error}); '
-                          'give the folder with its metadata.yaml') from error
-    # Readers fail in many ways on damaged storage, none of which is ours to tell apart.
-    except Exception as error:  # noqa: B902
-        raise SourceError(f'{path} is damaged ({type(error).__name__}: {error}); '
-                          'repair it with "ros2 bag reindex" or record it again') from error
-    try:
-        yield reader
-    finally:
-        reader.close()
+
+    name: str
+    msgtype: str
+    channels: tuple[Channel, ...]
+
+    def __len__(self) -> int:
+        """Return the number of messages."""
+        return sum(channel.count for channel in self.channels)
 
 
-def choose_connection(reader: AnyReader, path: Path, topic: str) -> Connection:
+def choose_topic(reader: BagReader, path: Path, topic: str) -> ImageTopic:
     """
-    Return the connection of the wanted image topic.
+    Return the wanted image topic.
 
     Parameters
     ----------
-    reader : AnyReader
+    reader : BagReader
         The open bag.
     path : Path
         Its name, for messages.
@@ -85,39 +77,63 @@ def choose_connection(reader: AnyReader, path: Path, topic: str) -> Connection:
     Raises
     ------
     SourceError
-        When there is no such image topic, or several to choose from.
+        When there is no such image topic, several to choose from, or no message on it.
 
     """
-    images = {c.topic: c for c in reader.connections if c.msgtype in (RAW, COMPRESSED)}
-    names = ', '.join(sorted(images))
+    images = [channel for channel in reader.channels if channel.msgtype in (RAW, COMPRESSED)]
+    names = sorted({channel.topic for channel in images})
     if not images:
-        others = ', '.join(sorted({c.topic for c in reader.connections})) or 'nothing'
+        others = ', '.join(sorted({channel.topic for channel in reader.channels})) or 'nothing'
         raise SourceError(f'{path} has no image topic; it holds {others}')
-    if topic:
-        wanted = '/' + topic.lstrip('/')
-        if wanted not in images:
-            raise SourceError(f'{path} has no image topic {wanted}; it has {names}')
-        return images[wanted]
-    if len(images) > 1:
-        raise SourceError(f'{path} has several image topics; choose one with --topic: {names}')
-    return next(iter(images.values()))
+    wanted = '/' + topic.lstrip('/') if topic else names[0]
+    # Topics of ROS 1 may have no slash.
+    chosen = [channel for channel in images if '/' + channel.topic.lstrip('/') == wanted
+              or channel.topic == wanted]
+    if not chosen:
+        raise SourceError(f'{path} has no image topic {wanted}; it has {", ".join(names)}')
+    if not topic and len(names) > 1:
+        raise SourceError(f'{path} has several image topics; choose one with --topic: '
+                          f'{", ".join(names)}')
+    kinds = sorted({channel.msgtype for channel in chosen if channel.count})
+    if len(kinds) > 1:
+        raise SourceError(f'{path} has messages of {" and ".join(kinds)} on {chosen[0].topic}; '
+                          'a topic has one type: split the bag, or record one of them')
+    if not kinds:
+        raise SourceError(f'{path} has no message on {chosen[0].topic}; record some images')
+    return ImageTopic(chosen[0].topic, kinds[0],
+                      tuple(channel for channel in chosen if channel.msgtype == kinds[0]))
 
 
-def header_stamp(message: Any) -> int:
-    """Return the stamp of a message's header, in nanoseconds."""
-    return message.header.stamp.sec * 1_000_000_000 + message.header.stamp.nanosec
+def decode_image(reader: BagReader, data: bytes, msgtype: str) -> tuple[int, npt.NDArray]:
+    """
+    Return header stamp, in nanoseconds, and pixels of a serialized image.
 
+    Raises
+    ------
+    ValueError
+        When it cannot be decoded; says why.
 
-def serialized_stamp(data: bytes) -> int:
-    """Return the header stamp, in nanoseconds, of a serialized message that has one."""
-    order = '<' if data[1] & 1 else '>'
-    seconds, nanoseconds = struct.unpack_from(f'{order}iI', data, 4)
-    return seconds * 1_000_000_000 + nanoseconds
+    """
+    # Folders and videos are read through the same door, and need no messages.
+    from msg_adapters.compressed import image_from_compressed
+    from msg_adapters.errors import MessageError
+    from msg_adapters.image import image_from_message
+
+    try:
+        message = reader.deserialize(data, msgtype)
+        stamp = header_stamp(message)
+        return stamp, (image_from_message if msgtype == RAW else image_from_compressed)(message)
+    except MessageError:
+        raise
+    # A damaged message fails in as many ways as it has bytes.
+    except Exception as error:  # noqa: B902
+        raise ValueError(f'the message is damaged ({type(error).__name__}: {error}); '
+                         'record it again') from error
 
 
 class BagImages:
     """
-    Frames of one image topic of a bag.
+    Frames of one image topic of a bag, in the order of recording.
 
     Parameters
     ----------
@@ -131,34 +147,93 @@ class BagImages:
     def __init__(self, path: Path, topic: str = '') -> None:
         self._path = path
         with open_bag(path) as reader:
-            connection = choose_connection(reader, path, topic)
-            self.topic = connection.topic
-            self._length = connection.msgcount
-            seconds = (reader.end_time - reader.start_time) * 1e-9
-        if not self._length:
-            raise SourceError(f'{path} has no message on {self.topic}; record some images')
-        self.fps = (self._length - 1) / seconds if self._length > 1 and seconds > 0 \
-            else _DEFAULT_FPS
+            images = choose_topic(reader, path, topic)
+            seconds = (reader.end - reader.begin) * 1e-9
+        self.topic = images.name
+        self._length = len(images)
+        fps = (self._length - 1) / seconds if seconds > 0 else 0.0
+        self.fps = fps if 0.1 <= fps <= 1000 else _DEFAULT_FPS
 
     def __len__(self) -> int:
         """Return the number of messages on the topic."""
         return self._length
 
     def __iter__(self) -> Iterator[Frame]:
-        """Yield the frames, with the stamps of their headers where these are set."""
-        # Folders and videos are read through the same door, and need no messages.
-        from msg_adapters.compressed import image_from_compressed
-        from msg_adapters.image import image_from_message
+        """
+        Yield the frames with the stamps of `ImageStamps`, numbered by their messages.
 
+        Images that cannot be decoded are left out, and a `SourceWarning` says which and why.
+
+        Raises
+        ------
+        SourceError
+            When no image can be decoded.
+
+        """
+        place = f'on {self.topic} of {self._path}'
+        skipped, stamps = SkippedImages(place), ImageStamps(place)
         with open_bag(self._path) as reader:
-            connection = choose_connection(reader, self._path, self.topic)
-            decode = image_from_message if connection.msgtype == RAW else image_from_compressed
-            messages = reader.messages([connection])
-            for index, (_, logged, data) in enumerate(messages):
-                message = reader.deserialize(data, connection.msgtype)
+            images = choose_topic(reader, self._path, self.topic)
+            for index, (_, logged, data) in enumerate(reader.messages(images.channels)):
                 try:
-                    image = decode(message)
-                except MessageError as error:
-                    raise SourceError(
-                        f'{self._path}, message {index} on {self.topic}: {error}') from error
-                yield Frame(index, header_stamp(message) or logged, image)
+                    header, image = decode_image(reader, data, images.msgtype)
+                except ValueError as error:
+                    skipped.add(index, error)
+                    continue
+                yield Frame(index, stamps.take(header, logged), image)
+        skipped.finish(len(images))
+
+
+class SkippedImages:
+    """
+    Account of the images that cannot be decoded.
+
+    Parameters
+    ----------
+    place : str
+        Where they are, for what is told: `on /image_raw of flight`.
+
+    """
+
+    def __init__(self, place: str) -> None:
+        self._place = place
+        self._count = 0
+        self._first: ValueError | None = None
+
+    def add(self, index: int, error: ValueError) -> None:
+        """
+        Note that image `index` is left out; the first ones are told one by one.
+
+        Raises
+        ------
+        SourceError
+            When the bag begins with so many of them that it must be the camera.
+
+        """
+        self._first = self._first or error
+        self._count += 1
+        if self._count == index + 1 == _HOPELESS:
+            raise SourceError(f'none of the first {_HOPELESS} images {self._place} can be '
+                              f'decoded: {self._first}') from self._first
+        if self._count <= _SKIPPED_TOLD:
+            _tell(f'image {index} {self._place} is left out: {error}')
+
+    def finish(self, total: int) -> None:
+        """
+        Tell how many were left out of `total`.
+
+        Raises
+        ------
+        SourceError
+            When all were.
+
+        """
+        if self._first is not None and self._count >= total:
+            raise SourceError(f'no image {self._place} can be decoded: '
+                              f'{self._first}') from self._first
+        if self._count > _SKIPPED_TOLD:
+            _tell(f'{self._count} of {total} images {self._place} were left out')
+
+
+def _tell(message: str) -> None:
+    warnings.warn(message, SourceWarning, stacklevel=1)

@@ -16,19 +16,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
-from contextlib import contextmanager
+from collections.abc import Iterable
 from pathlib import Path
-import shutil
 import sys
 
 import numpy as np
 import numpy.typing as npt
-from rosbags.rosbag2 import StoragePlugin, Writer, WriterError
 from rosbags.typesys import get_typestore, Stores
 from rosbags.typesys.store import Typestore
 
 from lmsco_ros.replay.bag_images import RAW
+from lmsco_ros.replay.bags.output import BagOutput
+from lmsco_ros.replay.bags.stamps import END_OF_TIME
 from lmsco_ros.replay.errors import OutputError
 from lmsco_ros.replay.frame import Frame
 from lmsco_ros.replay.storage import Storage
@@ -37,57 +36,10 @@ _ENCODINGS = {(np.dtype(np.uint8), 2): 'mono8', (np.dtype(np.uint16), 2): 'mono1
               (np.dtype(np.float32), 2): '32FC1', (np.dtype(np.uint8), 3): 'bgr8'}
 
 
-@contextmanager
-def create_bag(path: Path, storage: Storage) -> Iterator[Writer]:
-    """
-    Create a bag that does not exist yet; it is finished also when the user interrupts.
-
-    Raises
-    ------
-    OutputError
-        When there is something already, or the place cannot be written to.
-
-    """
-    plugin = {Storage.MCAP: StoragePlugin.MCAP, Storage.SQLITE3: StoragePlugin.SQLITE3}[storage]
-    require_free(path)
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        writer = Writer(path, version=9, storage_plugin=plugin)
-        writer.open()
-    except (OSError, WriterError) as error:
-        raise OutputError(f'{path} cannot be created ({error}); '
-                          'choose a place that can be written to') from error
-    try:
-        yield writer
-    except Exception:
-        # Half a bag is no use, and would stand in the way of the next try.
-        writer.close()
-        shutil.rmtree(path)
-        raise
-    except BaseException:
-        writer.close()
-        raise
-    writer.close()
-
-
-def require_free(path: Path) -> None:
-    """
-    Check that a new bag can be called `path`.
-
-    Raises
-    ------
-    OutputError
-        When there is something already.
-
-    """
-    if path.exists():
-        raise OutputError(f'{path} exists; choose another output, or remove it')
-
-
 def make_bag(frames: Iterable[Frame], path: Path, *, topic: str, frame_id: str,
              storage: Storage, start_ns: int) -> int:
     """
-    Write frames as sensor_msgs/Image and return how many there were.
+    Write frames into a new bag and return how many there were; see `write_frames`.
 
     Parameters
     ----------
@@ -105,19 +57,46 @@ def make_bag(frames: Iterable[Frame], path: Path, *, topic: str, frame_id: str,
     Raises
     ------
     OutputError
-        When the bag cannot be created.
+        When the bag cannot be created or written.
+
+    """
+    return write_frames(frames, BagOutput(path, storage), topic=topic, frame_id=frame_id,
+                        start_ns=start_ns)
+
+
+def write_frames(frames: Iterable[Frame], output: BagOutput, *, topic: str, frame_id: str,
+                 start_ns: int) -> int:
+    """
+    Write frames as sensor_msgs/Image into a bag and return how many there were.
+
+    When the frames break off, by an error or by a signal, those before are kept.
+
+    Parameters
+    ----------
+    frames : iterable of Frame
+        8 bit becomes mono8 or bgr8, 16 bit mono16, float 32FC1.
+    output : BagOutput
+        The bag, not opened yet.
+    topic, frame_id : str
+        Where the images appear, and in which coordinate frame.
+    start_ns : int
+        Added to the stamps of the frames, in nanoseconds.
+
+    Raises
+    ------
+    OutputError
+        When the bag cannot be created or written.
 
     """
     store = get_typestore(Stores.ROS2_JAZZY)
-    count = 0
-    with create_bag(path, storage) as writer:
-        connection = writer.add_connection('/' + topic.lstrip('/'), RAW, typestore=store)
+    with output:
+        connection = output.add_connection('/' + topic.lstrip('/'), RAW, typestore=store)
         for frame in frames:
             stamp = start_ns + frame.stamp_ns
             message = image_message(store, frame.image, stamp, frame_id)
-            writer.write(connection, stamp, store.serialize_cdr(message, RAW))
-            count += 1
-    return count
+            output.write(connection, stamp, store.serialize_cdr(message, RAW))
+            output.keep_from_now_on()
+    return output.count
 
 
 def image_message(store: Typestore, image: npt.NDArray, stamp_ns: int, frame_id: str) -> object:
@@ -127,6 +106,9 @@ def image_message(store: Typestore, image: npt.NDArray, stamp_ns: int, frame_id:
     if encoding is None:
         raise OutputError(f'no message holds an image of shape {image.shape} and type '
                           f'{image.dtype}; use 8 or 16 bit gray, or 8 bit color')
+    if not 0 <= stamp_ns < END_OF_TIME:
+        raise OutputError(f'no message holds the stamp {stamp_ns * 1e-9:.3f} s; expected one '
+                          'from 1970 to 2038: check the times of the source')
     seconds, nanoseconds = divmod(stamp_ns, 1_000_000_000)
     pixels = np.ascontiguousarray(image)
     return types[RAW](

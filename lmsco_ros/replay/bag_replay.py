@@ -18,23 +18,24 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from itertools import islice
+from functools import partial
 from pathlib import Path
 import time
 
 from geometry_msgs.msg import PolygonStamped
 from rclpy.serialization import deserialize_message
-from rosbags.highlevel import AnyReader
-from rosbags.interfaces import Connection
-from rosbags.rosbag2 import Writer
-from rosbags.typesys import get_typestore, Stores
 
 from lmsco_ros.core.types import BoundingBox
 from lmsco_ros.replay.bag_images import (
-    choose_connection, COMPRESSED, open_bag, serialized_stamp)
-from lmsco_ros.replay.bag_maker import create_bag, require_free
+    choose_topic, COMPRESSED, decode_image, ImageTopic, SkippedImages)
+from lmsco_ros.replay.bag_recorder import BagRecorder
+from lmsco_ros.replay.bags.channel import Channel
+from lmsco_ros.replay.bags.output import BagOutput
+from lmsco_ros.replay.bags.reader import BagReader, open_bag
+from lmsco_ros.replay.bags.stamps import ImageStamps, serialized_stamp, with_stamp
+from lmsco_ros.replay.bags.uninterrupted import uninterrupted
 from lmsco_ros.replay.errors import SourceError
-from lmsco_ros.replay.node_session import Heard, NODE_NAME, NodeSession, OUTPUTS
+from lmsco_ros.replay.node_session import Heard, NodeSession
 from lmsco_ros.replay.player import Exchange, Player
 from lmsco_ros.replay.storage import Storage
 from msg_adapters.boxes import box_from_polygon
@@ -43,6 +44,7 @@ MARKS_TOPIC = '/init_box_stamped'
 # While the node tracks one frame, the next one is on its way; the start is waited for.
 _AHEAD = 1
 _LINGER_SECONDS = 0.3
+_LONGEST_PAUSE_SECONDS = 60.0
 
 
 @dataclass(frozen=True)
@@ -82,85 +84,159 @@ class ReplayPlan:
     outputs: tuple[str, ...]
 
 
-def replay_bag(plan: ReplayPlan, on_begin: Callable[[int], None],
-               on_frame: Callable[[], None]) -> list[Exchange]:
+class Replay:
     """
-    Play a bag through the node and record the answers beside the original messages.
+    One pass of a bag through the node, recorded beside the original messages.
+
+    When it is broken off, by an error or by a signal, what the node answered so far is kept.
 
     Parameters
     ----------
     plan : ReplayPlan
         What to play.
-    on_begin : callable
-        Called once with the number of images.
-    on_frame : callable
-        Called for each image that was sent.
-
-    Returns
-    -------
-    list of Exchange
-        One for each image.
 
     Raises
     ------
-    ReplayError
-        When the bag cannot be read or written, or the node refuses.
+    OutputError
+        When there is something already where the new bag is wanted.
 
     """
-    require_free(plan.output)
-    with open_bag(plan.bag) as reader:
-        images = choose_connection(reader, plan.bag, plan.topic)
-        if not images.msgcount:
-            raise SourceError(f'{plan.bag} has no message on {images.topic}')
-        parameters = {'image_reliability': 'reliable', **plan.parameters,
-                      'frame_policy': 'latest' if plan.rate else 'all'}
-        with NodeSession(parameters, outputs=plan.outputs,
-                         compressed=images.msgtype == COMPRESSED) as session, \
-                create_bag(plan.output, plan.storage) as writer:
-            on_begin(min(images.msgcount, plan.frames or images.msgcount))
-            recorder = _Recorder(writer, reader, images.topic, session.outputs, plan.rate)
-            player = Player(session, recorder.on_heard)
-            _play(plan, reader, images, player, recorder, on_frame)
-    return player.exchanges()
+
+    def __init__(self, plan: ReplayPlan) -> None:
+        self._plan = plan
+        self._output = BagOutput(plan.output, plan.storage)
+        self._answered = 0
+
+    @property
+    def kept(self) -> str:
+        """What is in the new bag and where; empty when there is none."""
+        if not self._output.is_complete:
+            return ''
+        return (f'kept in {self._plan.output}: the messages so far, with {self._answered} boxes '
+                'of the node')
+
+    def run(self, on_begin: Callable[[int], None],
+            on_frame: Callable[[], None]) -> list[Exchange]:
+        """
+        Play the bag.
+
+        Parameters
+        ----------
+        on_begin : callable
+            Called once with the number of images.
+        on_frame : callable
+            Called for each image that was sent.
+
+        Returns
+        -------
+        list of Exchange
+            One for each image that could be decoded.
+
+        Raises
+        ------
+        ReplayError
+            When the bag cannot be read or written, or the node refuses.
+
+        """
+        plan = self._plan
+        with open_bag(plan.bag) as reader:
+            if reader.is_ros1:
+                raise SourceError(f'{plan.bag} is a bag of ROS 1; convert it with '
+                                  f'"rosbags-convert --src {plan.bag} --dst NEW", and replay that')
+            images = choose_topic(reader, plan.bag, plan.topic)
+            parameters = {'image_reliability': 'reliable', **plan.parameters,
+                          'frame_policy': 'latest' if plan.rate else 'all'}
+            with NodeSession(parameters, outputs=plan.outputs,
+                             compressed=images.msgtype == COMPRESSED) as session, \
+                    self._output as output:
+                on_begin(min(len(images), plan.frames or len(images)))
+                recorder = BagRecorder(output, reader, session.outputs, plan.rate)
+                player = Player(session, partial(self._on_heard, recorder))
+                _Playback(plan, reader, images, player, recorder).run(on_frame)
+        return player.exchanges()
+
+    def _on_heard(self, recorder: BagRecorder, heard: Heard, stamp: int, seconds: float) -> None:
+        with uninterrupted():
+            recorder.record(heard, stamp, seconds)
+            if heard.output == 'box':
+                self._answered += 1
+                self._output.keep_from_now_on()
 
 
-def _play(plan: ReplayPlan, reader: AnyReader, images: Connection, player: Player,
-          recorder: _Recorder, on_frame: Callable[[], None]) -> None:
-    """Send the images at their pace and copy everything else."""
-    pace = _Pace(plan.rate)
-    last = _last_moment(reader, images, plan.frames)
-    sent = 0
-    for connection, logged, data in reader.messages(stop=last + 1):
-        if connection.topic == images.topic:
-            stamp = serialized_stamp(data)
-            if plan.rate:
-                player.listen_until(pace.moment(logged))
+class _Playback:
+    """
+    Sends the images at their pace and copies everything else.
+
+    Parameters
+    ----------
+    plan : ReplayPlan
+        What to play.
+    reader : BagReader
+        The open bag.
+    images : ImageTopic
+        What the node is to see.
+    player : Player
+        Feeds the node.
+    recorder : BagRecorder
+        Writes the new bag.
+
+    """
+
+    def __init__(self, plan: ReplayPlan, reader: BagReader, images: ImageTopic, player: Player,
+                 recorder: BagRecorder) -> None:
+        self._plan, self._reader, self._images = plan, reader, images
+        self._player, self._recorder = player, recorder
+        self._pace = _Pace(plan.rate)
+        place = f'on {images.name} of {plan.bag}'
+        self._stamps = ImageStamps(place)
+        self._skipped = SkippedImages(place)
+        self._seen = self._sent = 0
+
+    def run(self, on_frame: Callable[[], None]) -> None:
+        """Play until the last wanted image, or the end."""
+        plan, player = self._plan, self._player
+        for channel, logged, data in self._reader.messages():
+            if channel in self._images.channels:
+                self._play_image(channel, logged, data)
+                on_frame()
+                if self._seen == plan.frames:
+                    break
             else:
-                player.settle(_AHEAD if sent > 1 else 0)
-            if not sent and plan.box is not None:
-                player.start(plan.box, stamp)
-            recorder.copy(connection, logged, data)
-            player.send(stamp, data)
-            sent += 1
-            on_frame()
+                self._play_other(channel, logged, data)
+        self._skipped.finish(self._seen)
+        if plan.rate:
+            player.finish()
         else:
-            if plan.box is None and connection.topic == MARKS_TOPIC:
-                player.start(_marked(data), serialized_stamp(data))
-            recorder.copy(connection, logged, data)
-    if plan.rate:
-        player.finish()
-    else:
-        player.settle(0)
-    # Pictures of the last frame come after its box.
-    player.listen_until(time.monotonic() + _LINGER_SECONDS)
+            player.settle(0)
+        # Pictures of the last frame come after its box.
+        player.listen_until(time.monotonic() + _LINGER_SECONDS)
 
+    def _play_image(self, channel: Channel, logged: int, data: bytes) -> None:
+        """Send an image; one that cannot be decoded is only copied."""
+        index, self._seen = self._seen, self._seen + 1
+        try:
+            header, _ = decode_image(self._reader, data, channel.msgtype)
+        except ValueError as error:
+            self._skipped.add(index, error)
+            self._recorder.copy(channel, logged, data)
+            return
+        stamp = self._stamps.take(header, logged)
+        if stamp != header:
+            data = with_stamp(data, stamp)
+        if self._plan.rate:
+            self._player.listen_until(self._pace.moment(logged))
+        else:
+            self._player.settle(_AHEAD if self._sent > 1 else 0)
+        if not self._sent and self._plan.box is not None:
+            self._player.start(self._plan.box, stamp)
+        self._recorder.copy_image(channel, logged, data, stamp)
+        self._player.send(stamp, data)
+        self._sent += 1
 
-def _last_moment(reader: AnyReader, images: Connection, frames: int | None) -> int:
-    """Return when the last wanted image was recorded, or the bag ends."""
-    if frames is None or frames >= images.msgcount:
-        return reader.end_time
-    *_, last = islice((logged for _, logged, _ in reader.messages([images])), frames)
-    return last
+    def _play_other(self, channel: Channel, logged: int, data: bytes) -> None:
+        if self._plan.box is None and channel.topic == MARKS_TOPIC:
+            self._player.start(_marked(data), serialized_stamp(data))
+        self._recorder.copy(channel, logged, data)
 
 
 def _marked(data: bytes) -> BoundingBox:
@@ -173,64 +249,15 @@ class _Pace:
 
     def __init__(self, rate: float) -> None:
         self._rate = rate
-        self._first: tuple[int, float] | None = None
+        self._last: tuple[int, float] | None = None
 
     def moment(self, logged: int) -> float:
         """Return when to play what was recorded at `logged`, in nanoseconds."""
-        if self._first is None:
-            self._first = (logged, time.monotonic())
-        return self._first[1] + (logged - self._first[0]) * 1e-9 / self._rate
-
-
-class _Recorder:
-    """
-    Writes the new bag.
-
-    Answers come after their image by what the node took, on the clock of the recording:
-    at twice the rate twice as much of it passes, at rate 0 none.
-    """
-
-    def __init__(self, writer: Writer, reader: AnyReader, image_topic: str,
-                 outputs: tuple[str, ...], rate: float) -> None:
-        self._writer = writer
-        self._image_topic = image_topic
-        self._rate = rate
-        self._logged: dict[int, int] = {}
-        store = get_typestore(Stores.ROS2_JAZZY)
-        topics = {output: f'/{NODE_NAME}/{output}' for output in outputs}
-        self._answers = {
-            output: writer.add_connection(topic, _type_name(OUTPUTS[output]), typestore=store)
-            for output, topic in topics.items()}
-        # Answers of an earlier replay make room for ours.
-        self._copies = {
-            connection.id: _copy_connection(writer, reader, connection)
-            for connection in reader.connections if connection.topic not in topics.values()}
-
-    def copy(self, connection: Connection, logged: int, data: bytes) -> None:
-        """Write an original message."""
-        if connection.topic == self._image_topic:
-            self._logged[serialized_stamp(data)] = logged
-        if connection.id in self._copies:
-            self._writer.write(self._copies[connection.id], logged, data)
-
-    def on_heard(self, heard: Heard, stamp: int, seconds: float) -> None:
-        """Write what the node says about the image with `stamp`, `seconds` after it."""
-        # One more, for viewers that would sort what comes at the same time.
-        moment = self._logged[stamp] + round(1e9 * self._rate * seconds) + 1
-        self._writer.write(self._answers[heard.output], moment, heard.data)
-
-
-def _type_name(message_type: type) -> str:
-    """Return the name of a message class, such as std_msgs/msg/Header."""
-    return f'{message_type.__module__.split(".")[0]}/msg/{message_type.__name__}'
-
-
-def _copy_connection(writer: Writer, reader: AnyReader, connection: Connection) -> Connection:
-    """Add a topic as it was: type definition, quality of service and all."""
-    definition = {'msgdef': connection.msgdef.data, 'rihs01': connection.digest}
-    if not all(definition.values()):
-        definition = {'typestore': reader.typestore}
-    return writer.add_connection(
-        connection.topic, connection.msgtype, **definition,
-        serialization_format=connection.ext.serialization_format,
-        offered_qos_profiles=connection.ext.offered_qos_profiles)
+        now = time.monotonic()
+        if self._last is None:
+            self._last = (logged, now)
+        last, moment = self._last
+        # A clock that was set while it was recorded makes pauses of years.
+        seconds = min((logged - last) * 1e-9, _LONGEST_PAUSE_SECONDS)
+        self._last = (logged, moment + seconds / self._rate)
+        return self._last[1]

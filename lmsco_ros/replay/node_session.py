@@ -118,6 +118,7 @@ class NodeSession:
         namespace = f'/session_{os.getpid()}_{id(self):x}'
         # Whoever replays reads results and complaints, not what goes as it should.
         set_logger_level(f'{namespace[1:]}.{NODE_NAME}', LoggingSeverity.WARN)
+        self._failure = ''
         self._threads: list[threading.Thread] = []
         self._executors: list[SingleThreadedExecutor] = []
         self._nodes: list[Node] = []
@@ -160,10 +161,23 @@ class NodeSession:
         self._starts.publish(polygon_from_box(box.as_tuple(), header))
 
     def next_message(self, timeout: float) -> Heard | None:
-        """Return the next message of the node, or None when `timeout` seconds have passed."""
+        """
+        Return the next message of the node, or None when `timeout` seconds have passed.
+
+        Raises
+        ------
+        NodeError
+            When nothing more will come, since the node has ended or is not active any more.
+
+        """
         try:
             return self._heard.get(timeout=max(timeout, 0.0))
         except queue.Empty:
+            if self._failure:
+                raise NodeError(f'the node ended: {self._failure}') from None
+            if not self._node.is_active:
+                raise NodeError('the node is not active any more; its log above says '
+                                'why') from None
             return None
 
     def close(self) -> None:
@@ -206,10 +220,13 @@ class NodeSession:
             executor.spin()
         except ExternalShutdownException:
             pass
-        except rclpy_implementation.RCLError:
+        except rclpy_implementation.RCLError as error:
             # Shutting down invalidates what the executor waits for.
             if self._context.ok():
-                raise
+                self._failure = str(error)
+        # Whatever it was, the command that listens has to know.
+        except Exception as error:  # noqa: B902
+            self._failure = f'{type(error).__name__}: {error}'
 
     def _wait_for_discovery(self) -> None:
         """Wait until everybody hears everybody; what is said earlier gets lost."""

@@ -25,12 +25,13 @@ from sensor_msgs.msg import CompressedImage, Image
 
 from lmsco_ros.core.types import BoundingBox
 from lmsco_ros.replay.answers import Answer, Answers
-from lmsco_ros.replay.bag_images import serialized_stamp
+from lmsco_ros.replay.bags.stamps import serialized_stamp
 from lmsco_ros.replay.errors import NodeError
 from lmsco_ros.replay.headers import header_at
 from lmsco_ros.replay.node_session import Heard, NodeSession
 
 _PATIENCE_SECONDS = 60.0
+_POLL_SECONDS = 1.0
 
 
 @dataclass(frozen=True)
@@ -131,12 +132,15 @@ class Player:
                 for stamp, sent in islice(self._sent.items(), start, None)]
 
     def _wait(self, is_done: Callable[[], bool]) -> None:
+        last = time.monotonic()
         while not is_done():
-            heard = self._session.next_message(_PATIENCE_SECONDS)
-            if heard is None:
+            heard = self._session.next_message(_POLL_SECONDS)
+            if heard is not None:
+                last = time.monotonic()
+                self._take(heard)
+            elif time.monotonic() - last > _PATIENCE_SECONDS:
                 raise NodeError(f'the node did not answer for {_PATIENCE_SECONDS:.0f} seconds; '
                                 'its log above may say why')
-            self._take(heard)
 
     def _take(self, heard: Heard) -> None:
         answer = self._answers.take(heard)
@@ -145,8 +149,9 @@ class Player:
             self._on_heard(heard, stamp, heard.received - self._sent[stamp])
         if answer.failure:
             raise NodeError(f'the node refuses: {answer.failure}')
-        if answer.is_tracked:
-            self._pending = [s for s in self._pending if not self._answers[s].is_tracked]
+        if answer.is_tracked and stamp in self._pending:
+            # The node answers in order: what it left out will never be answered.
+            del self._pending[:self._pending.index(stamp) + 1]
 
     def _exchange(self, stamp: int, sent: float) -> Exchange:
         answer = self._answers[stamp]

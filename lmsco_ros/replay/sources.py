@@ -29,7 +29,8 @@ import numpy.typing as npt
 from lmsco_ros.media.errors import MediaError, MediaWarning
 from lmsco_ros.media.image_files import IMAGE_SUFFIXES, ImageFiles
 from lmsco_ros.media.video import VideoFile
-from lmsco_ros.replay.bag_images import BagImages, is_bag
+from lmsco_ros.replay.bag_images import BagImages
+from lmsco_ros.replay.bags.files import is_bag
 from lmsco_ros.replay.errors import SourceError
 from lmsco_ros.replay.frame import Frame
 

@@ -14,9 +14,15 @@
 
 """`lmsco make-bag`: options reach the bag."""
 
+import signal
+import time
+
 import cv2
 import numpy as np
+import pytest
 from rosbags.highlevel import AnyReader
+
+PATIENCE_SECONDS = 60.0
 
 
 def connections_of(path):
@@ -61,3 +67,44 @@ def test_existing_output_is_refused(lmsco, tmp_path, scene_folder):
     (tmp_path / 'bag').mkdir()
     outcome = lmsco('make-bag', scene_folder, '--output', tmp_path / 'bag')
     assert outcome.exit_code == 1 and 'exists' in outcome.words
+
+
+@pytest.fixture
+def writing(lmsco_process, tmp_path, endless_folder):
+    """Return a process that has written some megabytes of a bag, and will for long."""
+    process = lmsco_process('make-bag', endless_folder, '--output', tmp_path / 'bag')
+    deadline = time.monotonic() + PATIENCE_SECONDS
+    file = tmp_path / 'bag.partial' / 'bag' / 'bag.mcap'
+    while not file.exists() or file.stat().st_size < 3_000_000:
+        assert time.monotonic() < deadline and process.poll() is None
+        time.sleep(0.01)
+    assert not (tmp_path / 'bag').exists()
+    return process
+
+
+@pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM, signal.SIGHUP],
+                         ids=lambda number: number.name)
+def test_signal_keeps_what_was_written_and_says_so(writing, tmp_path, number):
+    writing.send_signal(number)
+    _, complaints = writing.communicate(timeout=PATIENCE_SECONDS)
+    assert writing.returncode == 128 + number and 'Traceback' not in complaints
+    _, messages = connections_of(tmp_path / 'bag')
+    assert len(messages) > 50
+    assert (f'note: kept in {tmp_path / "bag"}: a bag with {len(messages)} frames'
+            in complaints.splitlines())
+    assert [path.name for path in tmp_path.iterdir()] == ['bag']
+
+
+def test_killed_process_leaves_nothing_that_looks_whole(writing, lmsco, tmp_path, scene_folder):
+    writing.kill()
+    writing.wait(PATIENCE_SECONDS)
+    assert [path.name for path in tmp_path.iterdir()] == ['bag.partial']
+    outcome = lmsco('make-bag', scene_folder, '--output', tmp_path / 'bag')
+    assert outcome.exit_code == 1 and 'one that was killed left it' in outcome.words
+
+
+def test_refused_source_leaves_no_bag(lmsco, tmp_path):
+    (tmp_path / 'empty').mkdir()
+    outcome = lmsco('make-bag', tmp_path / 'empty', '--output', tmp_path / 'bag')
+    assert outcome.exit_code == 1 and 'has no images' in outcome.words
+    assert [path.name for path in tmp_path.iterdir()] == ['empty']

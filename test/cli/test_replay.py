@@ -15,6 +15,8 @@
 """Folder -> make-bag -> replay -> bag: the answers stand beside the original messages."""
 
 from collections import Counter
+import signal
+import time
 
 import numpy as np
 import pytest
@@ -23,8 +25,9 @@ from rosbags.rosbag2 import StoragePlugin, Writer
 from rosbags.typesys import get_typestore, Stores
 
 from lmsco_ros.core.types import BoundingBox
-from lmsco_ros.replay.bag_images import header_stamp, RAW
+from lmsco_ros.replay.bag_images import RAW
 from lmsco_ros.replay.bag_maker import image_message
+from lmsco_ros.replay.bags.stamps import header_stamp
 
 
 def read(path):
@@ -134,6 +137,34 @@ def test_existing_output_is_refused_at_once(lmsco, tmp_path, bag, start):
     outcome = lmsco('replay', bag, '--init', start, '--output', bag)
     assert outcome.exit_code == 1 and 'exists' in outcome.words
     assert len(read(bag)) == 15
+
+
+def test_signal_keeps_what_was_answered_and_says_so(lmsco, lmsco_process, tmp_path, start,
+                                                    endless_folder):
+    bag = tmp_path / 'endless'
+    assert lmsco('make-bag', endless_folder, '--frames', 2000, '--output', bag).exit_code == 0
+    process = lmsco_process('replay', bag, '--init', start, '--rate', 0, '--output',
+                            tmp_path / 'out')
+    file = tmp_path / 'out.partial' / 'out' / 'out.mcap'
+    deadline = time.monotonic() + 60
+    while not file.exists() or file.stat().st_size < 3_000_000:
+        assert time.monotonic() < deadline and process.poll() is None
+        time.sleep(0.01)
+    process.send_signal(signal.SIGTERM)
+    _, complaints = process.communicate(timeout=60)
+    assert process.returncode == 128 + signal.SIGTERM and 'Traceback' not in complaints
+    counts = Counter(topic for topic, _, _ in read(tmp_path / 'out'))
+    assert 50 < counts['/lmsco_tracker/box'] <= counts['/image_raw'] < 2000
+    assert (f'kept in {tmp_path / "out"}: the messages so far, with '
+            f'{counts["/lmsco_tracker/box"]} boxes of the node') in complaints
+
+
+def test_notes_are_told(lmsco, tmp_path, bag, start):
+    (bag / 'metadata.yaml').unlink()
+    outcome = lmsco('replay', bag, '--init', start, '--rate', 0, '--frames', 3,
+                    '--output', tmp_path / 'out')
+    assert outcome.exit_code == 0 and '3 of 3 frames answered' in outcome.words
+    assert 'note: ' in outcome.words and f'ros2 bag reindex {bag}' in outcome.words
 
 
 def test_folder_is_no_bag(lmsco, tmp_path, scene_folder, start):

@@ -19,8 +19,8 @@ import pytest
 from rosbags.highlevel import AnyReader
 from rosbags.typesys import get_typestore, Stores
 
-from lmsco_ros.replay.bag_maker import create_bag, make_bag
-from lmsco_ros.replay.errors import OutputError
+from lmsco_ros.replay.bag_maker import make_bag
+from lmsco_ros.replay.errors import OutputError, SourceError
 from lmsco_ros.replay.frame import Frame
 from lmsco_ros.replay.storage import Storage
 
@@ -62,38 +62,25 @@ def test_rows_that_are_not_contiguous(tmp_path):
     np.testing.assert_array_equal(message.data.view(np.uint16).reshape(6, 4), image)
 
 
-def test_existing_output_is_kept(tmp_path):
-    (tmp_path / 'bag').mkdir()
-    with pytest.raises(OutputError, match='exists; choose another'):
-        make_bag([], tmp_path / 'bag', topic='i', frame_id='', storage=Storage.MCAP, start_ns=0)
+@pytest.mark.parametrize('error', [KeyboardInterrupt, SourceError('the next image is damaged')])
+def test_frames_before_the_source_breaks_off_are_kept(tmp_path, frames, error):
+    def broken():
+        yield from frames[:3]
+        raise error
 
-
-def test_place_that_cannot_be_written_to(tmp_path):
-    (tmp_path / 'file').write_text('')
-    with pytest.raises(OutputError, match='cannot be created'):
-        make_bag([], tmp_path / 'file' / 'bag', topic='i', frame_id='', storage=Storage.MCAP,
+    with pytest.raises(type(error) if isinstance(error, Exception) else error):
+        make_bag(broken(), tmp_path / 'bag', topic='i', frame_id='', storage=Storage.MCAP,
                  start_ns=0)
-
-
-def test_half_a_bag_is_removed(tmp_path):
-    with pytest.raises(RuntimeError):
-        with create_bag(tmp_path / 'bag', Storage.MCAP):
-            raise RuntimeError
-    assert not (tmp_path / 'bag').exists()
-
-
-def test_interrupted_bag_is_readable(tmp_path):
-    frames = [Frame(0, 1, np.zeros((4, 4), np.uint8))]
-
-    def interrupted():
-        yield from frames
-        raise KeyboardInterrupt
-
-    with pytest.raises(KeyboardInterrupt):
-        make_bag(interrupted(), tmp_path / 'bag', topic='i', frame_id='',
-                 storage=Storage.MCAP, start_ns=0)
     with AnyReader([tmp_path / 'bag']) as reader:
-        assert len(list(reader.messages())) == 1
+        assert len(list(reader.messages())) == 3
+
+
+@pytest.mark.parametrize('stamp', [-1, 2 ** 31 * 10 ** 9])
+def test_stamp_that_no_message_holds(tmp_path, stamp):
+    with pytest.raises(OutputError, match='no message holds the stamp'):
+        make_bag([Frame(0, stamp, np.zeros((4, 4), np.uint8))], tmp_path / 'bag', topic='i',
+                 frame_id='', storage=Storage.MCAP, start_ns=0)
+    assert not list(tmp_path.iterdir())
 
 
 def test_image_without_an_encoding(tmp_path):

@@ -162,3 +162,27 @@ def test_waiting_for_a_moment_never_takes_for_ever():
         thread.start()
         thread.join(30)
         assert not thread.is_alive()
+
+
+def test_node_that_ends_is_told():
+    with session(Follower()) as running:
+        player = Player(running)
+        play(player, range(3))
+        running._node.trigger_deactivate()
+        player.send(9 * SECOND, image_message(1, 9 * SECOND))
+        with pytest.raises(NodeError, match='not active any more'):
+            player.settle(0)
+
+
+def test_node_whose_thread_ends_is_told():
+    with session(Follower()) as running:
+        player = Player(running)
+        play(player, range(3))
+
+        def fail():
+            raise RuntimeError('nobody expected this')
+        running._node.create_timer(0.001, fail)
+        player.send(9 * SECOND, image_message(1, 9 * SECOND))
+        with pytest.raises(NodeError, match='the node ended: RuntimeError: nobody expected'):
+            while True:
+                player.listen_until(time.monotonic() + 0.05)

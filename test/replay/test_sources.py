@@ -18,51 +18,10 @@ import av
 import cv2
 import numpy as np
 import pytest
-from rosbags.typesys import get_typestore, Stores
 
 from lmsco_ros.media.errors import MediaWarning
-from lmsco_ros.replay.bag_maker import create_bag, image_message, make_bag
 from lmsco_ros.replay.errors import SourceError
 from lmsco_ros.replay.sources import open_source
-from lmsco_ros.replay.storage import Storage
-
-RAW = 'sensor_msgs/msg/Image'
-COMPRESSED = 'sensor_msgs/msg/CompressedImage'
-
-
-@pytest.fixture
-def bag(tmp_path, frames):
-    path = tmp_path / 'bag'
-    make_bag(frames, path, topic='thermal/image', frame_id='camera', storage=Storage.MCAP,
-             start_ns=1_700_000_000_000_000_000)
-    return path
-
-
-def add_messages(path, topics, storage=Storage.MCAP):
-    """Write a bag with one message on each of `topics`: name to (type, message)."""
-    store = get_typestore(Stores.ROS2_JAZZY)
-    with create_bag(path, storage) as writer:
-        for topic, (kind, message) in topics.items():
-            connection = writer.add_connection(topic, kind, typestore=store)
-            writer.write(connection, 5_000_000_000, store.serialize_cdr(message, kind))
-    return path
-
-
-def text(content):
-    return get_typestore(Stores.ROS2_JAZZY).types['std_msgs/msg/String'](data=content)
-
-
-def raw(stamp_ns=0):
-    store = get_typestore(Stores.ROS2_JAZZY)
-    return image_message(store, np.full((4, 6), 7, np.uint8), stamp_ns, 'camera')
-
-
-def compressed(image):
-    types = get_typestore(Stores.ROS2_JAZZY).types
-    stamp = types['builtin_interfaces/msg/Time'](sec=3, nanosec=4)
-    return types[COMPRESSED](
-        header=types['std_msgs/msg/Header'](stamp=stamp, frame_id=''), format='png',
-        data=cv2.imencode('.png', image)[1].reshape(-1))
 
 
 class TestFolder:
@@ -176,67 +135,6 @@ class TestVideo:
             frames = list(open_source(path))
         assert 5 < len(frames) < 40
         assert [f.index for f in frames] == list(range(len(frames)))
-
-
-class TestBag:
-    def test_frames_with_the_stamps_of_their_headers(self, bag, frames):
-        source = open_source(bag)
-        read = list(source)
-        assert len(source) == len(read) == 10 and source.fps == pytest.approx(25)
-        for frame, original in zip(read, frames):
-            np.testing.assert_array_equal(frame.image, original.image)
-            assert frame.stamp_ns == 1_700_000_000_000_000_000 + original.stamp_ns
-
-    def test_storage_file_is_enough(self, bag):
-        path, = bag.glob('*.mcap')
-        assert len(list(open_source(path))) == 10
-
-    @pytest.mark.parametrize('name', ['thermal/image', '/thermal/image', ''])
-    def test_topic_with_or_without_slash(self, bag, name):
-        assert open_source(bag, topic=name).topic == '/thermal/image'
-
-    def test_compressed_images(self, tmp_path, frames):
-        path = add_messages(tmp_path / 'bag', {
-            '/image/compressed': (COMPRESSED, compressed(frames[0].image))})
-        frame, = open_source(path)
-        np.testing.assert_array_equal(frame.image, frames[0].image)
-        assert frame.stamp_ns == 3_000_000_004
-
-    def test_without_stamp_the_time_of_recording_counts(self, tmp_path):
-        path = add_messages(tmp_path / 'bag', {'/image': (RAW, raw())})
-        assert next(iter(open_source(path))).stamp_ns == 5_000_000_000
-
-    def test_several_topics_are_named(self, tmp_path):
-        path = add_messages(tmp_path / 'bag', {'/left': (RAW, raw()), '/right': (RAW, raw())})
-        with pytest.raises(SourceError, match='--topic: /left, /right'):
-            open_source(path)
-        assert open_source(path, topic='right').topic == '/right'
-
-    def test_wrong_topic_is_answered_with_the_right_ones(self, bag):
-        with pytest.raises(SourceError, match='no image topic /nope; it has /thermal/image'):
-            open_source(bag, topic='nope')
-
-    def test_no_image_topic(self, tmp_path):
-        path = add_messages(tmp_path / 'bag', {'/chat': ('std_msgs/msg/String', text('hi'))})
-        with pytest.raises(SourceError, match='has no image topic; it holds /chat'):
-            open_source(path)
-
-    @pytest.mark.parametrize('storage', list(Storage))
-    def test_damaged_storage(self, tmp_path, frames, storage):
-        path = tmp_path / 'broken'
-        make_bag(frames, path, topic='image', frame_id='', storage=storage, start_ns=1)
-        for file in path.glob('*.*'):
-            if file.suffix != '.yaml':
-                file.write_bytes(b'no bag')
-        with pytest.raises(SourceError, match='broken'):
-            open_source(path)
-
-    def test_message_that_cannot_be_decoded_is_named(self, tmp_path):
-        message = raw()
-        message.encoding = 'yuv422'
-        path = add_messages(tmp_path / 'bag', {'/image': (RAW, message)})
-        with pytest.raises(SourceError, match='message 0 on /image.*yuv422'):
-            list(open_source(path))
 
 
 def test_missing_source(tmp_path):
