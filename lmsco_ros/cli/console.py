@@ -63,11 +63,15 @@ def _told_warnings() -> Iterator[None]:
 
     with warnings.catch_warnings():
         show_others = warnings.showwarning
+        told: set[str] = set()
 
         def show(message: Warning | str, category: type[Warning], *place: Any,
                  **more: Any) -> None:
             if issubclass(category, MediaWarning):
-                warn(str(message))
+                # What is opened twice has the same to say twice.
+                if str(message) not in told:
+                    told.add(str(message))
+                    warn(str(message))
             else:
                 show_others(message, category, *place, **more)
 
