@@ -6,7 +6,7 @@ PYTEST_ARGS ?= -n 2
 .PHONY: demo test lint venv
 
 demo: venv
-	$(BIN)/lmsco demo --overwrite
+	$(BIN)/lmsco demo
 
 test: venv
 	$(BIN)/python -m pytest $(PYTEST_ARGS)

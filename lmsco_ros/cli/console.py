@@ -19,7 +19,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 import os
-from typing import Any, NoReturn
+from typing import Any, NoReturn, TYPE_CHECKING
 import warnings
 
 from rich.console import Console, RenderableType
@@ -29,6 +29,9 @@ from rich.progress import (
     TimeRemainingColumn, TransferSpeedColumn)
 from rich.table import Table
 import typer
+
+if TYPE_CHECKING:
+    from lmsco_ros.replay.run_outputs import RunOutputs
 
 FAILED, MISUSED = 1, 2
 
@@ -114,6 +117,12 @@ def warn(message: str) -> None:
 def say(message: str) -> None:
     """Tell a result."""
     _print(_Terminal(soft_wrap=True), escape(message))
+
+
+def say_where(outputs: RunOutputs) -> None:
+    """Tell where the results of a run are."""
+    earlier = ', in place of those of an earlier run' if outputs.replaced else ''
+    say(f'boxes.csv, overlay.mp4 and summary.png are in {outputs.folder}{earlier}')
 
 
 def show_table(heads: Sequence[str], rows: Sequence[Sequence[str]]) -> None:

@@ -25,8 +25,8 @@ import typer
 
 from lmsco_ros.cli.configuration import load_config, node_parameters
 from lmsco_ros.cli.console import (
-    fail, FAILED, frame_progress, plain_errors, say, show_pairs, telling_what_is_kept)
-from lmsco_ros.cli.options import ConfigOption, OverwriteOption, PresetOption
+    fail, FAILED, frame_progress, plain_errors, say_where, show_pairs, telling_what_is_kept)
+from lmsco_ros.cli.options import ConfigOption, PresetOption
 from lmsco_ros.cli.ros import require_ros
 
 if TYPE_CHECKING:
@@ -47,7 +47,6 @@ def demo(
     output: Annotated[Path, typer.Option(
         file_okay=False, help='Folder for boxes.csv, overlay.mp4 and summary.png.')] = Path(
             'output/demo'),
-    overwrite: OverwriteOption = False,
     preset: PresetOption = 'default',
     config: ConfigOption = None,
     frames: Annotated[int, typer.Option(min=2, help='Length of the scene.')] = 360,
@@ -66,15 +65,16 @@ def demo(
         from lmsco_ros.synthetic import SceneConfig
 
         plot = SceneConfig(width=width, height=height, frames=frames, fps=rate, seed=seed)
-        outputs = RunOutputs(output, plot.fps, overwrite=overwrite, title=(
-            f'rendered scene {plot.seed}  ·  {config.stem if config else preset}'))
+        outputs = RunOutputs(
+            output, plot.fps,
+            f'rendered scene {plot.seed}  ·  {config.stem if config else preset}')
         with telling_what_is_kept(lambda: outputs.kept), outputs, frame_progress() as progress:
             scene = _render(plot, progress)
             tracked = _track(scene, node_parameters(preset, config), outputs, progress)
         if not tracked:
             fail('the node answered no frame', FAILED)
         _tell(tracked, frames)
-        say(f'boxes.csv, overlay.mp4 and summary.png are in {output}')
+        say_where(outputs)
 
 
 def _render(plot: SceneConfig, progress: Progress) -> list[SceneFrame]:

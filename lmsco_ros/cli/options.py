@@ -64,5 +64,3 @@ ConfigOption = Annotated[Optional[Path], typer.Option(
     help='YAML file with a tracker configuration, in place of the preset.')]
 FramesOption = Annotated[Optional[int], typer.Option(
     '--frames', min=1, show_default=False, help='Only the first N frames.')]
-OverwriteOption = Annotated[bool, typer.Option(
-    '--overwrite', help='Replace the results of an earlier run in the output.')]

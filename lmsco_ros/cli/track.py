@@ -26,10 +26,10 @@ import typer
 
 from lmsco_ros.cli.configuration import load_config
 from lmsco_ros.cli.console import (
-    fail, FAILED, frame_progress, MISUSED, plain_errors, say, telling_what_is_kept, warn)
+    fail, FAILED, frame_progress, MISUSED, plain_errors, say, say_where, telling_what_is_kept,
+    warn)
 from lmsco_ros.cli.options import (
-    Box, ConfigOption, FramesOption, OverwriteOption, parse_box, PresetOption, SourceArgument,
-    TopicOption)
+    Box, ConfigOption, FramesOption, parse_box, PresetOption, SourceArgument, TopicOption)
 
 if TYPE_CHECKING:
     from lmsco_ros.core import BoundingBox, LMSCOTracker, TrackResult
@@ -55,7 +55,6 @@ def track(
     output: Annotated[Optional[Path], typer.Option(
         file_okay=False, show_default='output/<source>',
         help='Folder for boxes.csv, overlay.mp4 and summary.png.')] = None,
-    overwrite: OverwriteOption = False,
     frames: FramesOption = None,
     ground_truth: Annotated[Optional[Path], typer.Option(
         exists=True, dir_okay=False, show_default=False,
@@ -76,11 +75,11 @@ def track(
         images = open_source(source, topic=topic)
         truth = _read_truth(ground_truth, len(images))
         start = _start_box(init, truth)
-        outputs = RunOutputs(folder, images.fps, overwrite=overwrite,
-                             title=f'{_title(source)}  ·  {config.stem if config else preset}')
+        outputs = RunOutputs(
+            folder, images.fps, f'{_title(source)}  ·  {config.stem if config else preset}')
         with telling_what_is_kept(lambda: outputs.kept):
             _run(LMSCOTracker(settings), images, start, truth, outputs, limit=frames)
-        say(f'boxes.csv, overlay.mp4 and summary.png are in {folder}')
+        say_where(outputs)
 
 
 def _read_truth(path: Optional[Path], frames: int) -> list[Optional[BoundingBox]]:

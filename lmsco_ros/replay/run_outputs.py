@@ -37,7 +37,8 @@ class RunOutputs:
     The results of one run in a folder; use as a context manager.
 
     Nothing is written before the first frame: a run that is refused leaves the folder as it
-    was. What was tracked before an error is kept.
+    was. The first frame takes the place of the results of an earlier run. What was tracked
+    before an error is kept.
 
     Parameters
     ----------
@@ -47,29 +48,31 @@ class RunOutputs:
         Speed of the film.
     title : str
         Headline of the summary.
-    overwrite : bool
-        Whether the first frame replaces the results of an earlier run.
+
+    Attributes
+    ----------
+    folder : Path
+        Where the results are.
+    replaced : tuple of str
+        Names of the files of an earlier run that had to go.
 
     Raises
     ------
     OutputError
-        When the folder holds results that are not to be replaced; later, when a file cannot
-        be written. Names the file.
+        When a file cannot be written; names it.
 
     """
 
-    def __init__(self, folder: Path, fps: float, title: str, *, overwrite: bool = False) -> None:
-        self._folder = folder
+    def __init__(self, folder: Path, fps: float, title: str) -> None:
+        self.folder = folder
         self._fps = fps
         self._title = title
-        self._overwrite = overwrite
         self._open = ExitStack()
         self._sheet = ContactSheet()
         self._boxes: BoxesFile | None = None
         self._video: OverlayVideo | None = None
         self._shown = 0
-        if not overwrite:
-            self._require_none()
+        self.replaced: tuple[str, ...] = ()
 
     def __enter__(self) -> RunOutputs:
         """Return the outputs."""
@@ -96,9 +99,9 @@ class RunOutputs:
         if self._boxes is None:
             return ''
         pictures = [name for name in (FILM, SUMMARY)
-                    if (self._folder / name).is_file() and (self._folder / name).stat().st_size]
+                    if (self.folder / name).is_file() and (self.folder / name).stat().st_size]
         files = ', '.join([f'{TABLE} with {self._boxes.rows} rows', *pictures])
-        return f'kept in {self._folder}: {files}'
+        return f'kept in {self.folder}: {files}'
 
     def add(self, frame: Frame, result: TrackResult, truth: BoundingBox | None = None) -> None:
         """Append one frame with what the tracker said and, where known, the truth."""
@@ -110,7 +113,7 @@ class RunOutputs:
         with _told():
             if self._boxes is None:
                 self._make_room()
-                self._boxes = self._open.enter_context(BoxesFile(self._folder / TABLE))
+                self._boxes = self._open.enter_context(BoxesFile(self.folder / TABLE))
             self._boxes.add(index, stamp_ns, result)
 
     def add_picture(self, frame: Frame, result: TrackResult,
@@ -118,30 +121,24 @@ class RunOutputs:
         """Show a frame, whose row is in the table, in film and summary."""
         with _told():
             if self._video is None:
-                film = OverlayVideo(self._folder / FILM, self._fps)
+                film = OverlayVideo(self.folder / FILM, self._fps)
                 self._video = self._open.enter_context(film)
             view = self._video.add(frame.image, result, label=str(frame.index), truth=truth)
         self._sheet.add(Moment(frame.index, view, result, truth))
         self._shown += 1
 
-    def _require_none(self) -> None:
-        found = [name for name in (TABLE, FILM, SUMMARY)
-                 if os.path.lexists(self._folder / name)]
-        if found:
-            raise OutputError(f'{self._folder} has {", ".join(found)} of an earlier run; choose '
-                              'another output, or replace them with --overwrite')
-
     def _make_room(self) -> None:
         """Make the folder, without earlier results: those of two runs are never mixed."""
-        self._folder.mkdir(parents=True, exist_ok=True)
-        if self._overwrite:
-            for name in (TABLE, FILM, SUMMARY):
-                (self._folder / name).unlink(missing_ok=True)
+        self.folder.mkdir(parents=True, exist_ok=True)
+        self.replaced = tuple(name for name in (TABLE, FILM, SUMMARY)
+                              if os.path.lexists(self.folder / name))
+        for name in self.replaced:
+            (self.folder / name).unlink()
 
     def _save_summary(self) -> None:
         if not self._shown:
             return
-        path = self._folder / SUMMARY
+        path = self.folder / SUMMARY
         partial = path.with_name(f'.{path.name}')
         try:
             with _told(path):

@@ -72,7 +72,7 @@ def test_words_need_nothing_heavy(words):
 
 @pytest.mark.parametrize('line, completions', [
     ('lmsco mak', {'make-bag'}), ('lmsco weights ver', {'verify'}),
-    ('lmsco track --overw', {'--overwrite'}), ('lmsco evaluate x --protocol v', {'vot'})])
+    ('lmsco track --ground', {'--ground-truth'}), ('lmsco evaluate x --protocol v', {'vot'})])
 def test_shell_completes(lmsco_process, line, completions):
     process = lmsco_process(env={
         **os.environ, '_LMSCO_COMPLETE': 'complete_bash', 'COMP_WORDS': line,

@@ -112,14 +112,12 @@ def test_errors_are_one_clear_line(lmsco, tmp_path, scene_folder, arguments, cod
     assert 'Traceback' not in outcome.output
 
 
-def test_earlier_results_are_replaced_only_on_request(lmsco, tmp_path, scene_folder, start):
+def test_earlier_results_are_replaced_and_that_is_told(lmsco, tmp_path, scene_folder, start):
     arguments = ('track', scene_folder, '--init', start, '--output', tmp_path, '--frames')
-    assert lmsco(*arguments, 4).exit_code == 0
+    assert 'earlier run' not in lmsco(*arguments, 4).words
     outcome = lmsco(*arguments, 2)
-    assert outcome.exit_code == 1 and 'of an earlier run' in outcome.words
-    assert '--overwrite' in outcome.words and len(rows_of(tmp_path)) == 4
-    assert lmsco(*arguments, 2, '--overwrite').exit_code == 0
-    assert len(rows_of(tmp_path)) == 2
+    assert outcome.exit_code == 0 and len(rows_of(tmp_path)) == 2
+    assert 'in place of those of an earlier run' in outcome.words
 
 
 @pytest.mark.parametrize('refused', ['box', 'image', 'truth'])
@@ -136,7 +134,7 @@ def test_refused_run_leaves_earlier_results_untouched(lmsco, tmp_path, scene_fol
     source, *wanted = {'box': (scene_folder, '--init', '900,900,20,20'),
                        'image': (broken, '--init', start),
                        'truth': (scene_folder, '--ground-truth', tmp_path / 'truth.txt')}[refused]
-    outcome = lmsco('track', source, *wanted, '--output', run, '--overwrite')
+    outcome = lmsco('track', source, *wanted, '--output', run)
     assert outcome.exit_code == 1 and 'error:' in outcome.words
     assert {path.name: path.read_bytes() for path in run.iterdir()} == before
 

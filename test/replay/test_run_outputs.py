@@ -148,25 +148,19 @@ def contents(folder):
     return {path.name: path.read_bytes() for path in folder.iterdir()}
 
 
-@pytest.mark.parametrize('name', ['boxes.csv', 'overlay.mp4', 'summary.png'])
-def test_results_of_an_earlier_run_are_refused(tmp_path, name):
-    (tmp_path / name).write_text('earlier')
-    with pytest.raises(OutputError, match=f'has {name} of an earlier run.*--overwrite'):
-        RunOutputs(tmp_path, 25, 'a run')
-    assert contents(tmp_path) == {name: b'earlier'}
-
-
 def test_run_without_a_frame_leaves_earlier_results_untouched(tmp_path):
     before = contents(earlier_results(tmp_path))
-    with RunOutputs(tmp_path, 25, 'a run', overwrite=True) as outputs:
+    with RunOutputs(tmp_path, 25, 'a run') as outputs:
         assert not outputs.kept
+    assert outputs.replaced == ()
     assert contents(tmp_path) == before
 
 
-def test_earlier_results_are_replaced_on_request_and_nothing_else(tmp_path, frames):
+def test_earlier_results_are_replaced_and_nothing_else(tmp_path, frames):
     earlier_results(tmp_path)
-    with RunOutputs(tmp_path, 25, 'a run', overwrite=True) as outputs:
+    with RunOutputs(tmp_path, 25, 'a run') as outputs:
         outputs.add_row(0, 0, result())
+        assert outputs.replaced == ('boxes.csv', 'overlay.mp4', 'summary.png')
         assert set(contents(tmp_path)) == {'boxes.csv', 'notes.txt'}
         outputs.add_picture(frames[0], result())
     after = contents(tmp_path)
