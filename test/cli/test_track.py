@@ -69,7 +69,7 @@ def test_default_output_is_named_after_the_source(lmsco, tmp_path, scene_folder,
 def test_configuration_file(lmsco, tmp_path, scene_folder, start):
     from lmsco_ros.core import TrackerConfig
 
-    TrackerConfig.preset('hcs').to_yaml(tmp_path / 'mine.yaml')
+    (tmp_path / 'mine.yaml').write_text(TrackerConfig.preset('hcs').to_yaml())
     outcome = lmsco('track', scene_folder, '--init', start, '--frames', 2,
                     '--config', tmp_path / 'mine.yaml', '--output', tmp_path / 'run')
     assert outcome.exit_code == 0, outcome.output

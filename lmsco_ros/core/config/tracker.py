@@ -143,9 +143,9 @@ class TrackerConfig:
         data['features'] = list(data['features'])
         return data
 
-    def to_yaml(self, path: str | Path) -> None:
-        """Write the configuration to a YAML file."""
-        Path(path).write_text(yaml.safe_dump(self.to_dict(), sort_keys=False), encoding='utf-8')
+    def to_yaml(self) -> str:
+        """Return the text of a file that `from_yaml` turns into the same configuration."""
+        return yaml.safe_dump(self.to_dict(), sort_keys=False)
 
 
 def _merge(base: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:

@@ -74,7 +74,7 @@ def test_file_round_trip(tmp_path):
                      scale=ScaleConfig(step=1.07),
                      features=(FeatureConfig((ChannelConfig('intensity', 0.5),), 8),
                                FeatureConfig((ChannelConfig('hog'),), 4)))
-    config.to_yaml(tmp_path / 'c.yaml')
+    (tmp_path / 'c.yaml').write_text(config.to_yaml())
     assert TrackerConfig.from_yaml(tmp_path / 'c.yaml') == config
     assert TrackerConfig.from_yaml(str(tmp_path / 'c.yaml')) == config
 
