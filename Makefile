@@ -3,7 +3,7 @@ BOOTSTRAP_PYTHON = $(shell command -v $(or $(PYTHON),python3))
 BIN = .venv/bin
 PYTEST_ARGS ?= -n 2
 
-.PHONY: demo test lint venv
+.PHONY: demo docs test lint venv
 
 demo: venv
 	$(BIN)/lmsco demo
@@ -13,6 +13,11 @@ test: venv
 
 lint: venv
 	$(BIN)/python -m pytest test/package/test_lint.py
+
+# The pages: build/docs/index.html. The configuration's is written from the code first.
+docs: venv
+	$(BIN)/python scripts/configuration_page.py
+	$(BIN)/python -m sphinx -W --keep-going -q docs build/docs
 
 venv:
 	@test -n "$(BOOTSTRAP_PYTHON)" || { echo 'lmsco_ros: $(or $(PYTHON),python3) is not there; install it: sudo apt install python3 python3-venv' >&2; exit 1; }

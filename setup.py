@@ -24,6 +24,7 @@ PACKAGE = 'lmsco_ros'
 # colcon cannot read the `attr:` of setup.cfg.
 VERSION = re.search(r"^__version__ = '(.+)'$",
                     (Path(__file__).parent / PACKAGE / '__init__.py').read_text(), re.MULTILINE)
+DOCS = ['myst-parser>=4,<6', 'sphinx>=8,<10']
 
 setup(
     name=PACKAGE,
@@ -69,7 +70,9 @@ setup(
         ],
         'peers': ['opencv-contrib-python-headless>=4.9,<6'],
         'vot': ['vot-trax==4.0.2'],
+        'docs': DOCS,
         'test': [
+            *DOCS,
             'colcon-common-extensions>=0.3,<1',
             'colcon-ros>=0.5,<1',
             'flake8>=7,<8',
