@@ -51,7 +51,7 @@ def cubic_spectrum(frequency: np.ndarray) -> np.ndarray:
 
 def interpolation_series(size: int) -> np.ndarray:
     """
-    Return the series of the kernel b of a block with `size` cells per axis.
+    Return the series of the kernel b of a block with `size` cells per axis (paper, (4)).
 
     Returns
     -------

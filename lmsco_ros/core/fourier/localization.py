@@ -60,7 +60,7 @@ class Peak:
 
 def locate(scores: Array, grid_points: int, newton_steps: int) -> Peak:
     """
-    Find the best scale and the position of its maximum.
+    Find the best scale and the position of its maximum (paper, (1)).
 
     Parameters
     ----------

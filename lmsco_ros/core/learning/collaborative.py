@@ -79,7 +79,7 @@ class CollaborativeOptimizer:
         self.filters = [symmetrize(block) for block in self._split(iterates[0])]
 
     def objective(self) -> float:
-        """Return E(W)."""
+        """Return E(W) (paper, (7))."""
         xp = array_namespace(self.filters[0])
         penalty = sum(float(xp.sum(mean_of_squares(window.apply(block))))
                       for window, block in zip(self._windows, self.filters, strict=True))
@@ -87,7 +87,7 @@ class CollaborativeOptimizer:
         return penalty + self._margin_weight * float(xp.sum(self._memory.weights * losses))
 
     def _normal(self, vector: Array) -> tuple[Array, Images]:
-        """Return the normal operator applied to a filter, and the filter's images."""
+        """Return the normal operator of a filter (paper, (12)), and the filter's images."""
         images = self._images(vector)
         _, penalty, scores = images
         return penalty + self._adjoint(self._loss.normal(scores)), images

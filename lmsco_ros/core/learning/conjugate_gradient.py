@@ -52,7 +52,7 @@ class ConjugateGradient:
               operator: Callable[[Array], tuple[Array, Images]],
               precondition: Callable[[Array], Array]) -> Images:
         """
-        Improve the solution of A x = b.
+        Improve the solution of A x = b, for the normal equations (paper, (12)).
 
         Parameters
         ----------

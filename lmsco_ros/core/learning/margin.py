@@ -85,15 +85,17 @@ class MarginLoss(Protocol):
         """Return M^H M S for series of scores, shape (2K + 1, K + 1, n)."""
 
     def slack_targets(self, scores: Array) -> Array:
-        """Solve for the slack at these scores and return M^H q, of the same shape."""
+        """Solve for the slack (paper, (8)) and return M^H q, of the shape of the scores."""
 
     def losses(self, scores: Array) -> Array:
-        """Return the mean squared hinge loss of each sample, shape (n,)."""
+        """Return the mean squared hinge loss of each sample, shape (n,) (paper, (2))."""
 
 
 class UnitAnchor:
     """
-    Anchor held at its desired value: a one-sided loss off the core.
+    Anchor held at its desired value: a one-sided loss off the core (paper, (11)).
+
+    With s(y0) = 1 the label rho of the paper is m - eps, and the filter fits it as it is.
 
     Parameters
     ----------
@@ -118,7 +120,7 @@ class UnitAnchor:
         return scores
 
     def slack_targets(self, scores: Array) -> Array:
-        """Return the series of q = m on the core, min(m, s) elsewhere."""
+        """Return the series of q = m on the core, min(m, s) elsewhere (paper, (9))."""
         return analyze(self._targets(synthesize(scores, self._size)))
 
     def losses(self, scores: Array) -> Array:
@@ -134,7 +136,7 @@ class UnitAnchor:
 
 class CoupledAnchor:
     """
-    Anchor that moves with the filter: the problem (10) as it stands.
+    Anchor that moves with the filter: the problem as it stands (paper, (10)).
 
     Parameters
     ----------
@@ -158,7 +160,7 @@ class CoupledAnchor:
         return result
 
     def slack_targets(self, scores: Array) -> Array:
-        """Return M^H q = Q[0] - Q[k] with q = max(l, s(0) - s); 0 at k = 0."""
+        """Return M^H q = Q[0] - Q[k], q = max(l, s(0) - s); 0 at k = 0 (paper, (9))."""
         series = analyze(self._targets(self._differences(scores)))
         order = int(scores.shape[1]) - 1
         return series[order, 0, :] - series

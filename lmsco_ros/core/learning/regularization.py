@@ -53,7 +53,7 @@ class CrossSeries:
 def window_series(target: tuple[float, float], minimum: float, edge: float,
                   threshold: float) -> CrossSeries:
     """
-    Return the sparse series of the spatial window.
+    Return the sparse series of the spatial window gamma (paper, (6)).
 
     Parameters
     ----------
