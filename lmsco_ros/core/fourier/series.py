@@ -15,7 +15,7 @@
 """
 Half spectra of real periodic functions in two dimensions, and what is done with them.
 
-A real function s(t), t = (ty, tx) in [0, 1)^2, of bandwidth K is
+A real function s(t), t = (ty, tx) in [0, 1)^2, of bandwidth K is::
 
     s(t) = sum_{|ky|, |kx| <= K} S[ky, kx] exp(2 pi i (ky ty + kx tx)).
 

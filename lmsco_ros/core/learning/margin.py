@@ -17,7 +17,7 @@ The margin loss on a grid of shifts: objective, slack step, and the operator M.
 
 Two readings of the anchor s(y0) in the margin constraint of the paper, (7)-(12), share one
 interface. In each outer iteration `slack_targets` solves for the slack (9), and the filter then
-fits  M S = q  in the least squares sense (10); `normal` is M^H M and the targets are M^H q.
+fits  M S = q  in the least squares sense (10); `normal` is M^H M and the targets are M^H q::
 
     unit     s(y0) has its desired value m(y0) = 1:  M S = s, q = m - eps, a one-sided loss,
              two-sided on the core {m >= 1/2}; with all shifts in the core it is ridge regression

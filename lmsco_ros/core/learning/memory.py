@@ -116,7 +116,7 @@ class SampleMemory:
     Attributes
     ----------
     mean, energy : list of array, shape (2K_l + 1, K_l + 1, C_l)
-        Running averages of Z[k] and |Z[k]|^2, each new sample entering with its prior weight.
+        Running averages of Z[k] and `|Z[k]|^2`, each new sample entering with its prior weight.
 
     """
 

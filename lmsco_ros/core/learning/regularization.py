@@ -66,8 +66,8 @@ def window_series(target: tuple[float, float], minimum: float, edge: float,
 
     Notes
     -----
-    gamma(y, x) = minimum + (edge - minimum) (|y / (h / 2)|^2 + |x / (w / 2)|^2), y and x from
-    the middle of the period, where the filter lives. The parabola (t - 1/2)^2 on [0, 1) has
+    gamma(y, x) = minimum + (edge - minimum) ((2 y / h)^2 + (2 x / w)^2), y and x from the
+    middle of the period, where the filter lives. The parabola (t - 1/2)^2 on [0, 1) has
     the coefficients 1 / 12 at k = 0 and 1 / (2 pi^2 k^2) elsewhere, all of them positive. What
     the threshold takes away lowers the minimum, which the constant then restores.
 
