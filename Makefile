@@ -14,9 +14,10 @@ test: venv
 lint: venv
 	$(BIN)/python -m pytest test/package/test_lint.py
 
-# The pages: build/docs/index.html. The configuration's is written from the code first.
+# The pages: build/docs/index.html. What stands in the code is written from there first.
 docs: venv
 	$(BIN)/python scripts/configuration_page.py
+	$(BIN)/python scripts/module_table.py
 	$(BIN)/python -m sphinx -W --keep-going -q docs build/docs
 
 venv:

@@ -12,6 +12,11 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Thermal infrared tracking with a large margin structured convolution operator."""
+"""
+Thermal infrared tracking with a large margin structured convolution operator.
+
+After Peng Gao, Yipeng Ma, Ke Song, Chao Li, Fei Wang, Liyi Xiao: Large Margin Structured
+Convolution Operator for Thermal Infrared Object Tracking, 2018.
+"""
 
 __version__ = '0.1.0'

@@ -73,7 +73,8 @@ PLACES = [(int(number.strip('()')), place)
 def test_modules_and_their_first_lines_are_those_of_the_code():
     told = [(name.strip('`'), meaning) for name, meaning
             in rows(section('The rooms of the core').split('\nEvery module')[1])]
-    assert dict(told) == modules() and len(told) == len(modules())
+    assert dict(told) == modules() and len(told) == len(modules()), (
+        'run: python scripts/module_table.py')
 
 
 def test_rooms_have_the_levels_that_the_layers_have():

@@ -110,7 +110,8 @@ def test_ranges_in_the_reference_are_those_of_the_checks():
     assert re.search(r'\| `margin_weight` \|.*\| \(0, 1e\+06\] \|', page)
     assert re.search(r'\| `update_interval` \|.*\| \[1, 1000\] \|', page)
     assert re.search(r'\| `kind` \|.*\| `hog`, `intensity`, `appearance`, `motion` \|', page)
-    assert re.search(r'\| `uncertain`, `certain` \|.*\| \[`lost`, 1\], \[`uncertain`, 1\] \|', page)
+    assert re.search(r'\| `uncertain`, `certain` \|.*\| \[`lost`, 1\], \[`uncertain`, 1\] \|',
+                     page)
 
 
 @pytest.mark.parametrize('page', ['tuning', 'configuration'])
@@ -153,7 +154,8 @@ def test_version_is_the_same_everywhere():
     citation = yaml.safe_load((REPOSITORY / 'CITATION.cff').read_text())
     package = parse_package(REPOSITORY / 'package.xml')
     assert lmsco_ros.__version__ == package.version == str(citation['version'])
-    released = re.findall(r'^(\d+\.\d+\.\d+) \(', (REPOSITORY / 'CHANGELOG.rst').read_text(), re.M)
+    changes = (REPOSITORY / 'CHANGELOG.rst').read_text()
+    released = re.findall(r'^(\d+\.\d+\.\d+) \(', changes, re.M)
     assert released[:1] == [package.version]
 
 

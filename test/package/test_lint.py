@@ -22,8 +22,8 @@ import sys
 import pytest
 
 REPOSITORY = Path(__file__).resolve().parents[2]
-SOURCES = ('benchmarks', 'launch', 'lmsco_ros', 'msg_adapters', 'scripts', 'setup.py', 'test',
-           'training')
+SOURCES = ('benchmarks', 'docs', 'examples', 'launch', 'lmsco_ros', 'msg_adapters', 'scripts',
+           'setup.py', 'test', 'training')
 
 
 @pytest.mark.parametrize('command', [
