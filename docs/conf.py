@@ -48,7 +48,9 @@ html_theme_options = {
     'description': 'Track anything warm',
     'page_width': '1200px',
     'sidebar_width': '240px',
-    'body_max_width': '900px',
+    'body_max_width': 'none',
+    # A line of 99 characters fits.
+    'code_font_size': '0.8em',
 }
 html_show_sourcelink = False
 
