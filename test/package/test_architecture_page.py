@@ -21,6 +21,8 @@ import re
 
 import pytest
 
+from benchmarks import frame_way
+
 REPOSITORY = Path(__file__).resolve().parents[2]
 CORE = REPOSITORY / 'lmsco_ros' / 'core'
 PAGE = (REPOSITORY / 'docs' / 'architecture.md').read_text()
@@ -117,3 +119,10 @@ def test_named_functions_and_files_exist():
 
 def test_picture_is_there_and_small():
     assert (REPOSITORY / 'docs/images/frame_way.png').stat().st_size < PICTURE_BYTES
+
+
+def test_picture_can_be_drawn_again(tmp_path):
+    frame_way.main(['--output', str(tmp_path / 'way.png')])
+    assert (tmp_path / 'way.png').stat().st_size > PICTURE_BYTES / 3
+    for _, _, places in frame_way.STEPS:
+        assert all((CORE / place).is_file() for place in places.split(', '))
