@@ -107,7 +107,7 @@ class HealthMonitor:
         self._arrivals: deque[float] = deque(maxlen=_WINDOW)
         self._newest_stamp = 0
         self._counts = dict.fromkeys(('received', 'tracked', 'refused', 'tracker_errors',
-                                      'backward_stamps'), 0)
+                                      'backward_stamps', 'faults'), 0)
         self._last_error = ''
         self._warning = ''
         self._state = Phase.IDLE.value
@@ -137,6 +137,18 @@ class HealthMonitor:
             self._counts['refused'] += 1
             self._last_error = reason
             self._state = Phase.REFUSED.value
+
+    def turned_away(self, reason: str) -> None:
+        """Note a request that says nothing about the images and was refused."""
+        with self._lock:
+            self._counts['refused'] += 1
+            self._last_error = reason
+
+    def faulted(self, text: str) -> None:
+        """Note a request that was given up because of what nobody expects."""
+        with self._lock:
+            self._counts['faults'] += 1
+            self._last_error = text
 
     def warned(self, warning: str) -> None:
         """Remember what stays wrong until the node is configured again; empty forgets it."""

@@ -18,12 +18,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+import contextlib
+import functools
 import time
 
 from builtin_interfaces.msg import Time
 from geometry_msgs.msg import PolygonStamped
 from rclpy.event_handler import SubscriptionEventCallbacks
-from rclpy.node import Node
 from rclpy.qos import HistoryPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.subscription import Subscription
 from sensor_msgs.msg import CompressedImage, Image, RegionOfInterest
@@ -32,11 +33,13 @@ from std_msgs.msg import Header
 from lmsco_ros.core.errors import LMSCOError
 from lmsco_ros.core.types import BoundingBox
 from lmsco_ros.node.diagnostics import HealthMonitor, Problem
+from lmsco_ros.node.guarded_node import GuardedNode
 from lmsco_ros.node.history import NANOSECONDS
 from lmsco_ros.node.image_sources import (image_sources, other_image_topics, stale_message,
                                           unheard_warning)
 from lmsco_ros.node.outcome import Frame
 from lmsco_ros.node.parameters import Settings
+from lmsco_ros.node.received import ReceivedImage, WhileThereIsRoom
 from lmsco_ros.node.worker import TrackerWorker
 from msg_adapters.boxes import box_from_polygon, box_from_region
 from msg_adapters.compressed import image_from_compressed
@@ -58,10 +61,10 @@ class Inputs:
 
     Parameters
     ----------
-    node : Node
+    node : GuardedNode
         Owner of the subscriptions.
     settings : Settings
-        Transport, quality of service and edges of the images.
+        Transport, quality of service, limits and edges of the images.
     worker : TrackerWorker
         Gets the frames and the boxes.
     monitor : HealthMonitor
@@ -71,19 +74,22 @@ class Inputs:
 
     """
 
-    def __init__(self, node: Node, settings: Settings, worker: TrackerWorker,
+    def __init__(self, node: GuardedNode, settings: Settings, worker: TrackerWorker,
                  monitor: HealthMonitor, refuse: Callable[[Header, str], None]) -> None:
         self._node = node
         self._worker = worker
         self._monitor = monitor
         self._refuse = refuse
         self._crop = settings.crop
-        self._image_type, self._images = self._subscribe_images(settings)
-        self._boxes = [
-            node.create_subscription(RegionOfInterest, 'init_box', self._on_region, _BOX_DEPTH),
-            node.create_subscription(PolygonStamped, 'init_box_stamped', self._on_polygon,
-                                     _BOX_DEPTH),
-        ]
+        with contextlib.ExitStack() as made:
+            self._image_type, self._images = self._subscribe_images(settings)
+            made.callback(node.destroy_subscription, self._images)
+            for kind, topic, callback in (
+                    (RegionOfInterest, 'init_box', self._on_region),
+                    (PolygonStamped, 'init_box_stamped', self._on_polygon)):
+                made.callback(node.destroy_subscription, node.create_subscription(
+                    kind, topic, callback, _BOX_DEPTH))
+            self._made = made.pop_all()
 
     @property
     def image_topic(self) -> str:
@@ -104,8 +110,7 @@ class Inputs:
 
     def close(self) -> None:
         """Stop listening."""
-        for subscription in [self._images, *self._boxes]:
-            self._node.destroy_subscription(subscription)
+        self._made.close()
 
     def _subscribe_images(self, settings: Settings) -> tuple[str, Subscription]:
         """Return the name of the image type, and the subscription."""
@@ -113,18 +118,21 @@ class Inputs:
             history=HistoryPolicy.KEEP_LAST if settings.image_depth else HistoryPolicy.KEEP_ALL,
             depth=settings.image_depth,
             reliability=_RELIABILITY[settings.image_reliability])
-        topic, kind, callback = 'image_raw', Image, self._on_raw
+        topic, kind, decode = 'image_raw', Image, image_from_message
         if settings.image_transport == 'compressed':
             # A remapping of image_raw has to reach the name that is made from it.
             topic = self._node.resolve_topic_name('image_raw') + '/compressed'
-            kind, callback = CompressedImage, self._on_compressed
+            kind = CompressedImage
+            decode = functools.partial(image_from_compressed, limits=settings.decoding_limits)
+        on_unheard = self._node.guarded(f'an event of {topic}', self._on_unheard)
         subscription = self._node.create_subscription(
-            kind, topic, callback, qos, event_callbacks=SubscriptionEventCallbacks(
-                incompatible_qos=lambda event: self._on_unheard(),
-                incompatible_type=lambda event: self._on_unheard()))
+            kind, topic, lambda message: self._take(message, decode), qos,
+            callback_group=WhileThereIsRoom(self._worker.has_room),
+            event_callbacks=SubscriptionEventCallbacks(
+                incompatible_qos=on_unheard, incompatible_type=on_unheard))
         return f'sensor_msgs/msg/{kind.__name__}', subscription
 
-    def _on_unheard(self) -> None:
+    def _on_unheard(self, event: object) -> None:
         """Tell at once when somebody offers images that cannot be received."""
         sources = image_sources(self._node.get_publishers_info_by_topic(self.image_topic),
                                 self._image_type, self._images.qos_profile)
@@ -134,24 +142,14 @@ class Inputs:
         if warning:
             self._node.get_logger().warning(warning)
 
-    def _on_raw(self, message: Image) -> None:
-        self._take(message, image_from_message)
-
-    def _on_compressed(self, message: CompressedImage) -> None:
-        self._take(message, image_from_compressed)
-
     def _take(self, message: Image | CompressedImage, decode: Callable) -> None:
         received, stamp = time.monotonic(), _nanoseconds(message.header.stamp)
         if self._monitor.received(stamp):
             self._node.get_logger().warning(
                 'the stamps of the images went backwards; earlier images are forgotten, '
                 'tracking goes on', throttle_duration_sec=5.0)
-        try:
-            image = self._crop.cut(decode(message))
-        except (MessageError, LMSCOError) as error:
-            self._refuse(message.header, str(error))
-        else:
-            self._worker.submit(Frame(image, stamp, received, message.header))
+        self._worker.submit(Frame(ReceivedImage(message, decode, self._crop), stamp, received,
+                                  message.header))
 
     def _on_region(self, region: RegionOfInterest) -> None:
         self._start(Header(), region, box_from_region, None)

@@ -27,20 +27,24 @@ T = TypeVar('T')
 
 class Mailbox(ABC, Generic[T]):
     """
-    Items in the order in which they came; commands are never dropped.
+    Items in the order in which they came; whoever puts one in never waits.
 
     The two kinds differ in what happens when frames come faster than they are taken.
     """
 
     def __init__(self) -> None:
         self._items: deque[T] = deque()
-        self._frames: deque[T] = deque()
         self._changed = threading.Condition()
         self._closed = False
 
-    @abstractmethod
+    def __len__(self) -> int:
+        return len(self._items)
+
     def put(self, item: T) -> None:
-        """Append an item that must not be dropped."""
+        """Append an item that a frame must not take the place of."""
+        with self._changed:
+            self._items.append(item)
+            self._changed.notify_all()
 
     @abstractmethod
     def put_frame(self, frame: T) -> int:
@@ -52,15 +56,32 @@ class Mailbox(ABC, Generic[T]):
             self._changed.wait_for(lambda: self._items or self._closed)
             if self._closed:
                 return None
-            item = self._items.popleft()
-            if self._frames and self._frames[0] is item:
-                self._frames.popleft()
-            self._changed.notify_all()
-            return item
+            item, left = self._items.popleft(), len(self._items)
+        self._taken(left)
+        return item
 
     @abstractmethod
-    def supersede(self, stale: Callable[[T], bool]) -> None:
-        """Drop waiting items, other than frames, that a new command makes pointless."""
+    def supersede(self, pointless: Callable[[T], bool], replaced: Callable[[T], bool]) -> int:
+        """
+        Drop waiting items that a new request leaves no use for.
+
+        Parameters
+        ----------
+        pointless : callable
+            Tells such items that answer no frame.
+        replaced : callable
+            Tells such items that answer a frame, too.
+
+        Returns
+        -------
+        int
+            How many frames will not be answered.
+
+        """
+
+    @abstractmethod
+    def has_room(self) -> bool:
+        """Tell whether whoever sends may put in another frame."""
 
     @abstractmethod
     def skips_behind(self, late: Callable[[T], bool]) -> bool:
@@ -72,34 +93,39 @@ class Mailbox(ABC, Generic[T]):
             self._closed = True
             self._changed.notify_all()
 
-    def _append(self, item: T, *, is_frame: bool = False) -> None:
-        self._items.append(item)
-        if is_frame:
-            self._frames.append(item)
-        self._changed.notify_all()
+    def _taken(self, left: int) -> None:
+        """Act on an item having been removed and so many being left."""
 
 
 class LatestMailbox(Mailbox[T]):
     """Keeps one frame: a new one takes the place of one that still waits."""
 
-    def put(self, item: T) -> None:
-        """Append an item."""
-        with self._changed:
-            self._append(item)
+    def __init__(self) -> None:
+        super().__init__()
+        self._frame: T | None = None
 
     def put_frame(self, frame: T) -> int:
         """Append a frame; return 1 when an older one had to go."""
         with self._changed:
-            dropped = len(self._frames)
-            if dropped:
-                self._items.remove(self._frames.popleft())
-            self._append(frame, is_frame=True)
+            before = len(self._items)
+            self._items = deque(item for item in self._items if item is not self._frame)
+            dropped = before - len(self._items)
+            self._frame = frame
+            self._items.append(frame)
+            self._changed.notify_all()
             return dropped
 
-    def supersede(self, stale: Callable[[T], bool]) -> None:
-        """Drop the stale items, so that a flood of commands cannot build up a delay."""
+    def supersede(self, pointless: Callable[[T], bool], replaced: Callable[[T], bool]) -> int:
+        """Drop both kinds, so that a flood of requests cannot build up a delay."""
         with self._changed:
-            self._items = deque(item for item in self._items if not stale(item))
+            dropped = sum(map(replaced, self._items))
+            self._items = deque(item for item in self._items
+                                if not pointless(item) and not replaced(item))
+            return dropped
+
+    def has_room(self) -> bool:
+        """Return True: a new frame always finds a place."""
+        return True
 
     def skips_behind(self, late: Callable[[T], bool]) -> bool:
         """Tell whether late items wait."""
@@ -109,37 +135,46 @@ class LatestMailbox(Mailbox[T]):
 
 class BoundedMailbox(Mailbox[T]):
     """
-    Keeps everything, and makes the sender wait while `capacity` items are waiting.
+    Keeps every frame; whoever sends has to hold back while `capacity` items are waiting.
 
     Parameters
     ----------
     capacity : int
         At least 1.
+    freed : callable
+        Called when there is room again, by the thread that made it.
 
     """
 
-    def __init__(self, capacity: int) -> None:
+    def __init__(self, capacity: int, freed: Callable[[], None]) -> None:
         super().__init__()
         self._capacity = capacity
-
-    def put(self, item: T) -> None:
-        """Append an item as soon as there is room."""
-        self._wait_and_append(item, is_frame=False)
+        self._freed = freed
 
     def put_frame(self, frame: T) -> int:
-        """Append a frame as soon as there is room; none is ever dropped."""
-        self._wait_and_append(frame, is_frame=True)
+        """Append a frame; none is ever dropped."""
+        self.put(frame)
         return 0
 
-    def supersede(self, stale: Callable[[T], bool]) -> None:
-        """Keep them: what comes out must not depend on how fast it is taken."""
+    def supersede(self, pointless: Callable[[T], bool], replaced: Callable[[T], bool]) -> int:
+        """Drop what no frame waits behind: what comes out for a frame depends on no haste."""
+        with self._changed:
+            before = len(self._items)
+            while self._items and pointless(self._items[-1]):
+                self._items.pop()
+            after = len(self._items)
+        if after < self._capacity <= before:
+            self._freed()
+        return 0
+
+    def has_room(self) -> bool:
+        """Tell whether less than `capacity` items are waiting."""
+        return len(self._items) < self._capacity
 
     def skips_behind(self, late: Callable[[T], bool]) -> bool:
         """Return False: no frame is ever dropped."""
         return False
 
-    def _wait_and_append(self, item: T, *, is_frame: bool) -> None:
-        with self._changed:
-            self._changed.wait_for(
-                lambda: len(self._items) < self._capacity or self._closed)
-            self._append(item, is_frame=is_frame)
+    def _taken(self, left: int) -> None:
+        if left == self._capacity - 1:
+            self._freed()

@@ -35,6 +35,29 @@ class Tracker(Protocol):
         """Find the target in the next frame."""
 
 
+class Picture(Protocol):
+    """
+    An image as it was received: small where it is compressed, read as often as it is needed.
+
+    Its memory is written by nobody else from its making on.
+    """
+
+    @property
+    def nbytes(self) -> int:
+        """Memory that it takes while it waits, in bytes."""
+
+    def read(self) -> npt.NDArray:
+        """
+        Return the pixels, shape (H, W) or (H, W, 3).
+
+        Raises
+        ------
+        LMSCOError
+            When they cannot be read.
+
+        """
+
+
 @dataclass(frozen=True, eq=False)
 class Frame:
     """
@@ -42,8 +65,8 @@ class Frame:
 
     Attributes
     ----------
-    image : ndarray, shape (H, W) or (H, W, 3)
-        Not changed by anybody from here on.
+    picture : Picture
+        What was received; read when the tracker gets to it, never when it is dropped.
     stamp : int
         When it was taken, in nanoseconds.
     received : float
@@ -53,10 +76,15 @@ class Frame:
 
     """
 
-    image: npt.NDArray
+    picture: Picture
     stamp: int
     received: float
     context: Any = None
+
+    @property
+    def nbytes(self) -> int:
+        """Memory that it takes while it waits, in bytes."""
+        return self.picture.nbytes
 
 
 class Phase(Enum):
@@ -90,7 +118,10 @@ class Outcome:
     error : str
         Why the request was refused or the target dropped.
     started, finished : float
-        When the tracker began and ended with the frame, on the clock of `time.monotonic`.
+        When the work on the frame, its reading included, began and ended, on the clock of
+        `time.monotonic`.
+    image : ndarray or None
+        The pixels of the frame; None when they could not be read, or nobody had to.
 
     """
 
@@ -102,3 +133,4 @@ class Outcome:
     error: str
     started: float
     finished: float
+    image: npt.NDArray | None = None

@@ -17,11 +17,13 @@
 
 from __future__ import annotations
 
+import contextlib
 import time
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import PolygonStamped
+import numpy.typing as npt
 from rclpy.lifecycle import LifecycleNode
 from rclpy.lifecycle.publisher import LifecyclePublisher
 from sensor_msgs.msg import Image
@@ -62,12 +64,14 @@ class Outputs:
         self._node = node
         self._display_range = DisplayRange()
         self._frames = 0
-        self._box = self._publisher(PolygonStamped, 'box')
-        self._status = self._publisher(DiagnosticArray, 'status')
-        self._confidence = self._publisher(Image, 'confidence_map')
-        self._overlay = self._publisher(Image, 'overlay')
-        self._marker = self._publisher(ImageMarker, 'marker')
-        self._detections = self._detections_publisher()
+        with contextlib.ExitStack() as made:
+            self._box = self._publisher(PolygonStamped, 'box', made)
+            self._status = self._publisher(DiagnosticArray, 'status', made)
+            self._confidence = self._publisher(Image, 'confidence_map', made)
+            self._overlay = self._publisher(Image, 'overlay', made)
+            self._marker = self._publisher(ImageMarker, 'marker', made)
+            self._detections = self._detections_publisher(made)
+            self._made = made.pop_all()
 
     def publish(self, outcome: Outcome, dropped_frames: int) -> float:
         """
@@ -93,9 +97,9 @@ class Outputs:
         if result is not None and _is_heard(self._confidence):
             self._confidence.publish(message_from_confidence(
                 result.confidence_map, result.search_region.as_tuple(),
-                crop.full_shape(outcome.frame.image), header))
-        if _is_heard(self._overlay):
-            self._publish_overlay(outcome, result, header)
+                crop.full_shape(outcome.image), header))
+        if outcome.image is not None and _is_heard(self._overlay):
+            self._publish_overlay(outcome.image, result, header)
         return published
 
     def publish_status(self, status: FrameStatus, header: Header) -> None:
@@ -104,19 +108,20 @@ class Outputs:
 
     def close(self) -> None:
         """Take the topics away."""
-        for publisher in (self._box, self._status, self._confidence, self._overlay,
-                          self._marker, self._detections):
-            if publisher is not None:
-                self._node.destroy_lifecycle_publisher(publisher)
+        self._made.close()
 
-    def _publisher(self, message_type: type, name: str) -> LifecyclePublisher:
-        return self._node.create_lifecycle_publisher(message_type, f'~/{name}', _DEPTH)
+    def _publisher(self, message_type: type, name: str,
+                   made: contextlib.ExitStack) -> LifecyclePublisher:
+        """Make a publisher that goes away with the others."""
+        publisher = self._node.create_lifecycle_publisher(message_type, f'~/{name}', _DEPTH)
+        made.callback(self._node.destroy_lifecycle_publisher, publisher)
+        return publisher
 
-    def _detections_publisher(self) -> LifecyclePublisher | None:
+    def _detections_publisher(self, made: contextlib.ExitStack) -> LifecyclePublisher | None:
         if not detections_available():
             return None
         from vision_msgs.msg import Detection2DArray
-        return self._publisher(Detection2DArray, 'detections')
+        return self._publisher(Detection2DArray, 'detections', made)
 
     def _outline(self, found: TrackResult | None, header: Header) -> ImageMarker:
         namespace = self._node.get_name()
@@ -130,18 +135,18 @@ class Outputs:
                       published: float) -> FrameStatus:
         result, reading = outcome.result, None
         if result is not None and result.state is not TrackState.LOST:
-            reading = target_reading(outcome.frame.image, result.box.as_tuple())
+            reading = target_reading(outcome.image, result.box.as_tuple())
         settings = self.settings
         return frame_status(
             outcome, dropped_frames, published, target=reading, target_celsius=celsius(
                 reading, settings.radiometric_scale, settings.radiometric_offset))
 
-    def _publish_overlay(self, outcome: Outcome, result: TrackResult | None,
+    def _publish_overlay(self, image: npt.NDArray, result: TrackResult | None,
                          header: Header) -> None:
         self._frames += 1
         if self._frames % self.settings.overlay_interval:
             return
-        view = self.settings.crop.fill(self._display_range.apply(outcome.frame.image))
+        view = self.settings.crop.fill(self._display_range.apply(image))
         picture = draw_overlay(view, result, label=self.settings.overlay_label)
         self._overlay.publish(message_from_image(picture, encoding='bgr8', header=header))
 

@@ -31,6 +31,7 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter
 
 from lmsco_ros.node.crop import Crop
+from msg_adapters.compressed import DecodingLimits
 
 
 def _setting(default: Any, description: str, *, limits: tuple[float, float] | None = None,
@@ -98,6 +99,15 @@ class Settings:
         2.0, 'How long images are kept for init_box_stamped, in seconds.', limits=(0.0, 60.0))
     frame_history_frames: int = _setting(
         64, 'At most this many images are kept for init_box_stamped.', limits=(1, 10000))
+    frame_history_megabytes: int = _setting(
+        256, 'At most so much memory holds images for init_box_stamped, as they were received, '
+        'in megabytes.', limits=(1, 1000000))
+    max_image_pixels: int = _setting(
+        2 ** 26, 'Compressed images of more pixels are refused before they are decoded.',
+        limits=(1, 2 ** 30))
+    max_jpeg_scans: int = _setting(
+        100, 'Jpeg images of more scans are refused before they are decoded; each scan of a '
+        'progressive one costs as much as an image.', limits=(1, 100000))
     crop_left: int = _setting(
         0, 'Columns at the left edge of the image that the tracker does not see; boxes stay in '
         'pixels of the full image.', limits=(0, 10000))
@@ -126,6 +136,11 @@ class Settings:
         '', 'Text in the lower left corner of ~/overlay.', live=True)
     marker_line_width: float = _setting(
         2.0, 'Width of the outline in ~/marker, in pixels.', limits=(0.1, 100.0), live=True)
+
+    @property
+    def decoding_limits(self) -> DecodingLimits:
+        """What it may cost to decode a compressed image."""
+        return DecodingLimits(self.max_image_pixels, self.max_jpeg_scans)
 
     @property
     def crop(self) -> Crop:

@@ -17,12 +17,12 @@
 
 from __future__ import annotations
 
-import traceback
+from collections.abc import Callable
 
-from rclpy.lifecycle import LifecycleNode
 from std_msgs.msg import Header
 
 from lmsco_ros.node.diagnostics import HealthMonitor, Problem, refused_status
+from lmsco_ros.node.guarded_node import GuardedNode
 from lmsco_ros.node.history import FrameHistory
 from lmsco_ros.node.inputs import Inputs
 from lmsco_ros.node.mailbox import BoundedMailbox, LatestMailbox, Mailbox
@@ -36,6 +36,7 @@ from msg_adapters.status import Level
 _STOP_SECONDS = 0.6
 # Messages of one kind are repeated in the log after this time at the earliest.
 _QUIET_SECONDS = 5.0
+_MEGABYTE = 1_000_000
 
 
 class TrackingSession:
@@ -44,7 +45,7 @@ class TrackingSession:
 
     Parameters
     ----------
-    node : LifecycleNode
+    node : GuardedNode
         Owner of the subscriptions.
     settings : Settings
         Of the images and the mailbox.
@@ -57,17 +58,23 @@ class TrackingSession:
 
     """
 
-    def __init__(self, node: LifecycleNode, settings: Settings, tracker: Tracker,
+    def __init__(self, node: GuardedNode, settings: Settings, tracker: Tracker,
                  outputs: Outputs, monitor: HealthMonitor) -> None:
         self._node = node
         self._outputs = outputs
         self._monitor = monitor
         self.worker = TrackerWorker(
-            tracker, self._deliver, mailbox=_mailbox(settings),
-            history=FrameHistory(settings.frame_history_seconds, settings.frame_history_frames))
+            tracker, self._deliver, on_fault=node.faults.note,
+            mailbox=_mailbox(settings, node.guarded('waking the executor', self._wake)),
+            history=FrameHistory(settings.frame_history_seconds, settings.frame_history_frames,
+                                 settings.frame_history_megabytes * _MEGABYTE))
         monitor.restart()
-        self._inputs = Inputs(node, settings, self.worker, monitor, self._refuse)
         self.worker.start()
+        try:
+            self._inputs = Inputs(node, settings, self.worker, monitor, self._refuse)
+        except Exception:
+            self.worker.stop(_STOP_SECONDS)
+            raise
 
     @property
     def image_topic(self) -> str:
@@ -90,18 +97,19 @@ class TrackingSession:
     def _deliver(self, outcome: Outcome) -> None:
         """Tell what became of a frame; runs in the worker's thread."""
         log = self._node.get_logger()
-        try:
-            self._monitor.answered(outcome)
-            published = self._outputs.publish(outcome, self.worker.dropped_frames)
-            self._monitor.published(outcome, published)
-            if outcome.phase is Phase.FAILED:
-                log.error(f'the tracker failed, the target is dropped: {outcome.error}')
-            elif outcome.phase is Phase.REFUSED:
-                log.error(outcome.error, throttle_duration_sec=_QUIET_SECONDS)
-        except Exception:  # noqa: B902
-            # A signal invalidates the publishers at any moment; anything else is a mistake.
-            if self._node.context.ok():
-                log.error(traceback.format_exc(), throttle_duration_sec=_QUIET_SECONDS)
+        self._monitor.answered(outcome)
+        if outcome.phase is Phase.FAILED:
+            log.error(f'the tracker failed, the target is dropped: {outcome.error}')
+        elif outcome.phase is Phase.REFUSED:
+            log.error(outcome.error, throttle_duration_sec=_QUIET_SECONDS)
+        published = self._outputs.publish(outcome, self.worker.dropped_frames)
+        self._monitor.published(outcome, published)
+
+    def _wake(self) -> None:
+        """Let the executor look again at what it left with the middleware."""
+        executor = self._node.executor
+        if executor is not None:
+            executor.wake()
 
     def _refuse(self, header: Header, reason: str) -> None:
         """Tell that a message cannot be used."""
@@ -111,8 +119,8 @@ class TrackingSession:
         self._node.get_logger().error(reason, throttle_duration_sec=_QUIET_SECONDS)
 
 
-def _mailbox(settings: Settings) -> Mailbox:
+def _mailbox(settings: Settings, freed: Callable[[], None]) -> Mailbox:
     """Return the mailbox that the frame policy names."""
     if settings.frame_policy == 'latest':
         return LatestMailbox()
-    return BoundedMailbox(settings.queue_size)
+    return BoundedMailbox(settings.queue_size, freed)

@@ -18,23 +18,23 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+import contextlib
 import functools
-import traceback
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray
 from rcl_interfaces.msg import SetParametersResult
 from rclpy.clock import Clock, ClockType
 from rclpy.exceptions import ParameterException
-from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
+from rclpy.lifecycle import LifecycleState, TransitionCallbackReturn
 from rclpy.parameter import Parameter
-from rclpy.service import Service
 from std_msgs.msg import Header
 from std_srvs.srv import SetBool, Trigger
 
 from lmsco_ros.core.errors import LMSCOError
 from lmsco_ros.node import parameters
 from lmsco_ros.node.diagnostics import HealthMonitor, Problem
+from lmsco_ros.node.guarded_node import GuardedNode
 from lmsco_ros.node.outcome import Tracker
 from lmsco_ros.node.outputs import Outputs
 from lmsco_ros.node.parameters import Settings
@@ -49,21 +49,21 @@ _Transition = Callable[['TrackerNode', LifecycleState], TransitionCallbackReturn
 
 
 def _reported(transition: _Transition) -> _Transition:
-    """Log what a transition raises, which rclpy keeps to itself."""
+    """Tell what a transition raises, which rclpy keeps to itself."""
     @functools.wraps(transition)
     def wrapper(self: TrackerNode, state: LifecycleState) -> TransitionCallbackReturn:
         try:
             return transition(self, state)
         except LMSCOError as error:
-            self.get_logger().error(str(error))
+            self._fail(str(error))
             return TransitionCallbackReturn.FAILURE
-        except Exception:  # noqa: B902
-            self.get_logger().error(traceback.format_exc())
+        except Exception as error:  # noqa: B902
+            self.faults.note(f'the transition {transition.__name__}', error)
             return TransitionCallbackReturn.ERROR
     return wrapper
 
 
-class TrackerNode(LifecycleNode):
+class TrackerNode(GuardedNode):
     """
     Connects ROS to a tracker; decides nothing itself.
 
@@ -89,12 +89,14 @@ class TrackerNode(LifecycleNode):
     def __init__(self, node_name: str = 'lmsco_tracker', *,
                  tracker_factory: Callable[[Settings], Tracker] = make_tracker,
                  **kwargs: Any) -> None:
-        super().__init__(node_name, **kwargs)
+        self._monitor = HealthMonitor()
+        super().__init__(node_name, count_fault=self._monitor.faulted,
+                         count_refusal=self._monitor.turned_away, **kwargs)
         self._tracker_factory = tracker_factory
         self._tracker: Tracker | None = None
         self._outputs: Outputs | None = None
         self._session: TrackingSession | None = None
-        self._served: list[Service] = []
+        self._offered = contextlib.ExitStack()
         try:
             self.settings = parameters.declare(self)
         except ParameterException:
@@ -102,7 +104,6 @@ class TrackerNode(LifecycleNode):
             raise
         self.add_on_set_parameters_callback(self._judge_change)
         self.add_post_set_parameters_callback(self._apply_change)
-        self._monitor = HealthMonitor()
         self._health = self.create_publisher(DiagnosticArray, '/diagnostics', 10)
         # Health must be told while a simulated clock stands still, too.
         self.create_timer(_HEALTH_PERIOD, self._report_health,
@@ -121,12 +122,12 @@ class TrackerNode(LifecycleNode):
         """Read the parameters, make the tracker, offer topics and services."""
         self.settings = parameters.read(self)
         self._monitor.warned('')
-        self._tracker = with_fallback(self._tracker_factory, self.settings, self._warn)
-        self._outputs = Outputs(self, self.settings)
-        self._served = [
-            self.create_service(Trigger, '~/reset', self._on_reset),
-            self.create_service(SetBool, '~/set_enabled', self._on_set_enabled),
-        ]
+        try:
+            self._tracker = with_fallback(self._tracker_factory, self.settings, self._warn)
+            self._offer()
+        except Exception:
+            self._release()
+            raise
         return super().on_configure(state)
 
     @_reported
@@ -173,14 +174,19 @@ class TrackerNode(LifecycleNode):
         session, self._session = self._session, None
         return session is None or session.stop()
 
+    def _offer(self) -> None:
+        """Make the topics and services that exist as long as the node is configured."""
+        self._outputs = Outputs(self, self.settings)
+        self._offered.callback(self._outputs.close)
+        for kind, name, callback in ((Trigger, '~/reset', self._on_reset),
+                                     (SetBool, '~/set_enabled', self._on_set_enabled)):
+            self._offered.callback(self.destroy_service,
+                                   self.create_service(kind, name, callback))
+
     def _release(self) -> None:
         self._stop_session()
-        if self._outputs is not None:
-            self._outputs.close()
-            self._outputs = None
-        for service in self._served:
-            self.destroy_service(service)
-        self._served = []
+        self._offered.close()
+        self._outputs = None
         self._tracker = None
 
     def _on_reset(self, request: Trigger.Request,
@@ -199,6 +205,11 @@ class TrackerNode(LifecycleNode):
             response.success = True
             response.message = 'enabled' if request.data else 'disabled'
         return response
+
+    def _fail(self, reason: str) -> None:
+        """Tell why a transition is not made."""
+        self._monitor.turned_away(reason)
+        self.get_logger().error(reason)
 
     def _warn(self, warning: str) -> None:
         """Log what stays wrong, and keep it in the diagnostics."""

@@ -15,105 +15,71 @@
 """
 A tracker in a thread of its own, fed through a mailbox; knows nothing of ROS.
 
-Frames and commands take effect in the order in which they were given. Everything that
+Frames and requests take effect in the order in which they were given, except that a reset
+reaches what waits as well. Images are read here, when their turn comes. Everything that
 happens to a frame comes back as an :class:`~lmsco_ros.node.outcome.Outcome`, errors included.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import replace
 import threading
 import time
+
+import numpy.typing as npt
 
 from lmsco_ros.core.errors import LMSCOError
 from lmsco_ros.core.types import BoundingBox, TrackResult
 from lmsco_ros.node.history import FrameHistory, NANOSECONDS
 from lmsco_ros.node.mailbox import Mailbox
 from lmsco_ros.node.outcome import Frame, Outcome, Phase, Tracker
-
-
-@dataclass(frozen=True, eq=False)
-class _Step:
-    frame: Frame
-    live: bool = True
-
-
-@dataclass(frozen=True, eq=False)
-class _Start:
-    frame: Frame
-    box: BoundingBox
-    live: bool = False
-
-
-@dataclass(frozen=True, eq=False)
-class _Refuse:
-    frame: Frame
-    reason: str
-
-
-@dataclass(frozen=True, eq=False)
-class _Reset:
-    pass
-
-
-@dataclass(frozen=True, eq=False)
-class _Enable:
-    enabled: bool
-
-
-@dataclass(frozen=True)
-class _Request:
-    """A start that waits for its frame; without a stamp any frame will do."""
-
-    box: BoundingBox
-    stamp: int | None
-    made: float
-
-    def wants(self, frame: Frame) -> bool:
-        """Tell whether the frame is the one to start on."""
-        return self.stamp is None or frame.stamp == self.stamp
-
-    def has_missed(self, frame: Frame, patience: float) -> bool:
-        """Tell from a later frame whether the one to start on will not come any more."""
-        return self.stamp is not None and (
-            frame.stamp > self.stamp or frame.received - self.made > patience)
+from lmsco_ros.node.work import (answers_no_frame, is_late_step, is_live_start, Item, Orders,
+                                 Refuse, Request, Start, Step)
 
 
 class TrackerWorker:
     """
     Runs a tracker over frames as they come.
 
+    Nobody who hands something over ever waits for the tracker.
+
     Parameters
     ----------
     tracker : Tracker
         Used by the worker's thread only.
     deliver : callable
-        Called with every outcome, in the worker's thread; must not raise.
+        Called with every outcome, in the worker's thread.
     mailbox : Mailbox
         Decides what happens when frames come faster than they are tracked: a
         :class:`~lmsco_ros.node.mailbox.LatestMailbox` drops the older ones, a
-        :class:`~lmsco_ros.node.mailbox.BoundedMailbox` lets :meth:`submit` wait.
+        :class:`~lmsco_ros.node.mailbox.BoundedMailbox` says when to hold back.
     history : FrameHistory
         Frames to start on later.
+    on_fault : callable
+        Called with what was being done and what was raised by it that nobody expects, in the
+        worker's thread; must not raise.
 
     """
 
     def __init__(self, tracker: Tracker, deliver: Callable[[Outcome], None], *,
-                 mailbox: Mailbox, history: FrameHistory[Frame]) -> None:
+                 mailbox: Mailbox[Item], history: FrameHistory[Frame],
+                 on_fault: Callable[[str, BaseException], None]) -> None:
         self._tracker = tracker
         self._deliver = deliver
         self._mailbox = mailbox
         self._history = history
+        self._on_fault = on_fault
         self._intake = threading.Lock()
-        self._request: _Request | None = None
+        self._orders = Orders()
+        self._request: Request | None = None
+        self._newest_request: Request | None = None
         self._dropped = 0
-        self._extra_steps = 0
+        self._extra_steps = self._extra_bytes = 0
         # The rest belongs to the thread alone.
         self._busy_since: float | None = None
         self._track_id = 0
-        self._has_target = False
-        self._enabled = True
+        self._target_of: int | None = None
         self._stopping = threading.Event()
         # A tracker that never returns must not keep the process alive.
         self._thread = threading.Thread(target=self._run, name='tracker', daemon=True)
@@ -130,9 +96,13 @@ class TrackerWorker:
 
     @property
     def busy_seconds(self) -> float:
-        """Time since the tracker began with the frame that it is at; 0 while it waits."""
+        """Time since the work on the present frame began; 0 while the worker waits."""
         since = self._busy_since
         return 0.0 if since is None else time.monotonic() - since
+
+    def has_room(self) -> bool:
+        """Tell whether another frame should be handed over now."""
+        return self._mailbox.has_room()
 
     def start(self) -> None:
         """Start the thread."""
@@ -163,22 +133,22 @@ class TrackerWorker:
         return not self._thread.is_alive()
 
     def submit(self, frame: Frame) -> None:
-        """Hand over the next frame; waits only when the mailbox keeps all and is full."""
+        """Hand over the next frame."""
         with self._intake:
             self._history.add(frame)
-            request = self._request
+            orders, request = self._orders, self._request
             if request is not None and request.wants(frame):
                 self._request = None
-                self._mailbox.put(_Start(frame, request.box, live=True))
+                self._mailbox.put(Start(frame, orders, request, live=True))
                 return
             if request is not None and request.has_missed(frame, self._history.seconds):
                 self._request = None
-                self._mailbox.put(_Refuse(frame, _unknown_stamp(request.stamp, self._history)))
-            if self._extra_steps and self._mailbox.skips_behind(_is_late_step):
-                self._extra_steps -= 1
-                self._mailbox.put(_Step(frame, live=False))
+                self._mailbox.put(
+                    Refuse(frame, orders, _unknown_stamp(request.stamp, self._history)))
+            if self._may_follow(frame):
+                self._mailbox.put(Step(frame, orders, live=False))
             else:
-                self._dropped += self._mailbox.put_frame(_Step(frame))
+                self._dropped += self._mailbox.put_frame(Step(frame, orders))
 
     def initialize(self, box: BoundingBox, stamp: int | None = None) -> None:
         """
@@ -193,119 +163,151 @@ class TrackerWorker:
             since are gone through again, and those that come meanwhile, up to twice as many
             as the history holds; then the newest is next. By default the newest frame is
             taken. A start whose frame is still to come waits for it: without a stamp for the
-            first frame, with one no longer than frames are kept.
+            first frame that can be read, with one no longer than frames are kept.
 
         """
         with self._intake:
             self._supersede()
-            newest = self._history[-1] if self._history else None
+            request = self._newest_request = Request(box, stamp, time.monotonic())
+            newest = self._history.last if self._history else None
             if newest is None or stamp is not None and stamp > newest.stamp:
-                self._request = _Request(box, stamp, time.monotonic())
+                self._request = request
                 return
             frames = [newest] if stamp is None else self._history.since(stamp)
             if not frames:
-                self._mailbox.put(_Refuse(newest, _unknown_stamp(stamp, self._history)))
+                self._mailbox.put(
+                    Refuse(newest, self._orders, _unknown_stamp(stamp, self._history)))
                 return
-            self._mailbox.put(_Start(frames[0], box))
-            self._extra_steps = self._history.maxlen
+            self._mailbox.put(Start(frames[0], self._orders, request))
+            self._extra_steps, self._extra_bytes = self._history.frames, self._history.nbytes
             for frame in frames[1:]:
-                self._mailbox.put(_Step(frame, live=False))
+                self._mailbox.put(Step(frame, self._orders, live=False))
 
     def reset(self) -> None:
-        """Drop the target, and a start that still waits for its frame."""
+        """
+        Drop the target, and every start that was asked for.
+
+        It takes effect at once: frames that wait are answered without a target.
+        """
         with self._intake:
             self._supersede()
-            self._mailbox.put(_Reset())
+            self._orders = replace(self._orders, resets=self._orders.resets + 1)
 
     def set_enabled(self, enabled: bool) -> None:
         """Pause, keeping the target, or go on."""
         with self._intake:
-            self._mailbox.put(_Enable(enabled))
+            self._orders = replace(self._orders, enabled=enabled)
 
     def _supersede(self) -> None:
-        """Forget what an earlier start still waits for."""
-        self._request = None
-        self._mailbox.supersede(_is_superseded)
+        """Forget what earlier starts still have to do."""
+        self._request = self._newest_request = None
+        self._extra_steps = 0
+        self._dropped += self._mailbox.supersede(answers_no_frame, is_live_start)
+
+    def _may_follow(self, frame: Frame) -> bool:
+        """Tell whether a start in the past that catches up goes through this frame, too."""
+        follows = (self._extra_steps > 0 and self._extra_bytes >= frame.nbytes
+                   and self._mailbox.skips_behind(is_late_step))
+        if follows:
+            self._extra_steps -= 1
+            self._extra_bytes -= frame.nbytes
+        return follows
 
     def _run(self) -> None:
-        handlers = {_Step: self._step, _Start: self._begin, _Refuse: self._refuse,
-                    _Reset: self._drop_target, _Enable: self._enable}
         while (item := self._mailbox.take()) is not None:
             self._busy_since = time.monotonic()
-            handlers[type(item)](item)
+            try:
+                self._handle(item)
+            except BaseException as error:  # noqa: B902
+                # Nothing may end the thread: the node would be deaf without a word.
+                self._on_fault('answering an image', error)
             self._busy_since = None
 
-    def _step(self, item: _Step) -> None:
-        if not self._enabled:
-            self._report(item, Phase.DISABLED)
-        elif not self._has_target:
-            self._report(item, Phase.IDLE)
+    def _handle(self, item: Item) -> None:
+        """Read the frame of an item, and do what the item asks for."""
+        reset_since = item.orders.resets != self._orders.resets
+        if reset_since and not item.live:
+            return
+        if isinstance(item, Refuse):
+            self._report(item, Phase.REFUSED, item.reason)
+            return
+        started = time.monotonic()
+        try:
+            image = item.frame.picture.read()
+        except LMSCOError as error:
+            self._set_aside(item, str(error), started)
+        except Exception as error:  # noqa: B902
+            self._on_fault('reading an image', error)
+            self._set_aside(item, f'the image cannot be read: {type(error).__name__}: {error}',
+                            started)
         else:
-            self._track(item, lambda: self._tracker.update(item.frame.image))
+            if isinstance(item, Start) and not reset_since:
+                self._begin(item, image, started)
+            else:
+                self._step(item, image, started)
 
-    def _begin(self, item: _Start) -> None:
-        if not self._enabled:
-            self._report(item, Phase.REFUSED,
-                         'cannot start while tracking is disabled; enable it first')
+    def _set_aside(self, item: Step | Start, reason: str, started: float) -> None:
+        """Refuse an unreadable frame; a start that any frame would do for waits for another."""
+        with self._intake:
+            self._history.discard(item.frame)
+            if isinstance(item, Start) and item.request.stamp is None \
+                    and item.request is self._newest_request:
+                self._request = item.request
+        self._report(item, Phase.REFUSED, reason, started=started)
+
+    def _step(self, item: Step | Start, image: npt.NDArray, started: float) -> None:
+        if not item.orders.enabled:
+            self._report(item, Phase.DISABLED, image=image, started=started)
+        elif self._target_of != self._orders.resets:
+            self._report(item, Phase.IDLE, image=image, started=started)
+        else:
+            self._track(item, image, lambda: self._tracker.update(image), started)
+
+    def _begin(self, item: Start, image: npt.NDArray, started: float) -> None:
+        if not item.orders.enabled:
+            self._report(item, Phase.REFUSED, image=image, started=started,
+                         error='cannot start while tracking is disabled; enable it first')
             return
 
         def start() -> TrackResult:
-            result = self._tracker.initialize(item.frame.image, item.box)
+            result = self._tracker.initialize(image, item.request.box)
             self._track_id += 1
-            self._has_target = True
+            self._target_of = item.orders.resets
             return result
 
-        self._track(item, start)
+        self._track(item, image, start, started)
 
-    def _refuse(self, item: _Refuse) -> None:
-        self._report(item, Phase.REFUSED, item.reason)
-
-    def _drop_target(self, item: _Reset) -> None:
-        self._has_target = False
-
-    def _enable(self, item: _Enable) -> None:
-        self._enabled = item.enabled
-
-    def _track(self, item: _Step | _Start, work: Callable[[], TrackResult]) -> None:
+    def _track(self, item: Step | Start, image: npt.NDArray,
+               work: Callable[[], TrackResult], started: float) -> None:
         """
         Let the tracker work on a frame.
 
         What the tracker refuses leaves it as it was; anything else that it raises costs the
         target, and only that.
         """
-        started = time.monotonic()
         try:
             result = work()
         except LMSCOError as error:
-            self._report(item, Phase.REFUSED, str(error), started=started)
+            self._report(item, Phase.REFUSED, str(error), image=image, started=started)
         except Exception as error:  # noqa: B902
-            self._has_target = False
-            self._report(item, Phase.FAILED, f'{type(error).__name__}: {error}', started=started)
+            self._target_of = None
+            self._report(item, Phase.FAILED, f'{type(error).__name__}: {error}', image=image,
+                         started=started)
         else:
-            self._report(item, Phase.TRACKED, result=result, started=started)
+            self._report(item, Phase.TRACKED, image=image, result=result, started=started)
 
-    def _report(self, item: _Step | _Start | _Refuse, phase: Phase, error: str = '', *,
-                result: TrackResult | None = None, started: float | None = None) -> None:
+    def _report(self, item: Item, phase: Phase, error: str = '', *,
+                result: TrackResult | None = None, image: npt.NDArray | None = None,
+                started: float | None = None) -> None:
         if not self._stopping.is_set():
-            live = isinstance(item, (_Step, _Start)) and item.live
             finished = time.monotonic()
-            self._deliver(Outcome(item.frame, phase, result, self._track_id, live, error,
-                                  finished if started is None else started, finished))
-
-
-def _is_late_step(item: object) -> bool:
-    """Tell whether an item belongs to a start in the past that catches up."""
-    return isinstance(item, _Step) and not item.live
-
-
-def _is_superseded(item: object) -> bool:
-    """Tell whether a new request leaves no use for an item."""
-    return isinstance(item, _Refuse) or isinstance(item, (_Step, _Start)) and not item.live
+            self._deliver(Outcome(item.frame, phase, result, self._track_id, item.live, error,
+                                  finished if started is None else started, finished, image))
 
 
 def _unknown_stamp(stamp: int, history: FrameHistory[Frame]) -> str:
     """Say why a start on a certain frame cannot be met."""
-    first, last = history[0].stamp / NANOSECONDS, history[-1].stamp / NANOSECONDS
+    first, last = history.first.stamp / NANOSECONDS, history.last.stamp / NANOSECONDS
     return (f'no frame with the stamp {stamp / NANOSECONDS:.9f} is kept (there are '
             f'{len(history)} from {first:.9f} to {last:.9f}); copy the stamp of the image that '
             'the box was found in, or keep frames for longer')

@@ -38,7 +38,7 @@ class Clock:
 def outcome(phase=Phase.TRACKED, state=TrackState.TRACKING, *, live=True, error=''):
     result = TrackResult(BOX, 0.5, state, np.zeros((2, 2), np.float32), BOX) \
         if phase is Phase.TRACKED else None
-    frame = Frame(np.zeros((2, 2)), 0, 0.0)
+    frame = Frame(None, 0, 0.0)
     return Outcome(frame, phase, result, 3, live, error, 0.006, 0.010)
 
 

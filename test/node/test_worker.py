@@ -25,6 +25,7 @@ from hypothesis import given, strategies as st
 import numpy as np
 import pytest
 
+from lmsco_ros.core.errors import ImageError
 from lmsco_ros.core.types import BoundingBox, TrackResult, TrackState
 from lmsco_ros.node.history import FrameHistory
 from lmsco_ros.node.mailbox import BoundedMailbox, LatestMailbox
@@ -35,6 +36,20 @@ REPOSITORY = Path(__file__).resolve().parents[2]
 PATIENCE = 20.0
 BOX = BoundingBox(1, 2, 3, 4)
 SECOND = 10 ** 9
+
+
+class Pixels:
+    """An image that is read without ROS, and counts how often."""
+
+    def __init__(self, image, error=None):
+        self.image, self.error, self.reads = image, error, 0
+        self.nbytes = image.nbytes
+
+    def read(self):
+        self.reads += 1
+        if self.error is not None:
+            raise self.error
+        return self.image
 
 
 class Recorder:
@@ -65,12 +80,13 @@ class Recorder:
 class Bench:
     """A worker, its tracker and what it delivered."""
 
-    def __init__(self, mailbox=None, seconds=10.0, frames=100):
-        self.tracker, self.outcomes = Recorder(), []
+    def __init__(self, mailbox=None, seconds=10.0, frames=100, nbytes=10 ** 6):
+        self.tracker, self.outcomes, self.faults = Recorder(), [], []
         self.changed = threading.Condition()
         self.worker = TrackerWorker(
-            self.tracker, self._deliver, mailbox=mailbox or LatestMailbox(),
-            history=FrameHistory(seconds, frames))
+            self.tracker, self._deliver, mailbox=LatestMailbox() if mailbox is None else mailbox,
+            history=FrameHistory(seconds, frames, nbytes),
+            on_fault=lambda work, error: self.faults.append((work, error)))
         self.worker.start()
 
     def _deliver(self, outcome):
@@ -78,11 +94,12 @@ class Bench:
             self.outcomes.append(outcome)
             self.changed.notify_all()
 
-    def frame(self, number, received=None):
+    def frame(self, number, received=None, error=None):
         """Submit the frame whose pixels and stamp in seconds are `number`."""
-        frame = Frame(np.full((2, 2), number), int(number * SECOND),
-                      time.monotonic() if received is None else received)
-        self.worker.submit(frame)
+        pixels = Pixels(np.full((2, 2), number), error)
+        self.worker.submit(Frame(pixels, int(number * SECOND),
+                                 time.monotonic() if received is None else received))
+        return pixels
 
     def wait(self, count):
         """Wait for so many outcomes in total and return the last."""
@@ -129,7 +146,7 @@ def test_outcome_tells_frame_times_and_context(bench):
     b = bench()
     b.worker.initialize(BOX)
     received = time.monotonic() - 5
-    b.worker.submit(Frame(np.zeros((2, 2)), 0, received, 'context'))
+    b.worker.submit(Frame(Pixels(np.zeros((2, 2))), 0, received, 'context'))
     outcome = b.wait(1)
     assert (outcome.phase, outcome.live, outcome.track_id) == (Phase.TRACKED, True, 1)
     assert outcome.frame.context == 'context'
@@ -151,34 +168,26 @@ def test_latest_drops_what_a_busy_tracker_cannot_take(bench):
     assert b.worker.dropped_frames == 4
 
 
-def test_all_makes_the_sender_wait_and_loses_nothing(bench):
-    b = bench(BoundedMailbox(2))
+def test_all_says_when_to_hold_back_and_loses_nothing(bench):
+    room = threading.Semaphore(0)
+    b = bench(BoundedMailbox(2, room.release))
     b.worker.initialize(BOX)
     b.hold()
     b.frame(0)
     b.stuck()
-    sender = threading.Thread(target=lambda: [b.frame(number) for number in range(1, 8)])
-    sender.start()
-    sender.join(0.1)
-    assert sender.is_alive()
+    assert b.worker.has_room()
+    b.frame(1)
+    b.frame(2)
+    assert not b.worker.has_room()
+    # Whoever does not ask is not held up either, and nothing is lost.
+    b.frame(3)
     b.tracker.gate.set()
+    assert room.acquire(timeout=PATIENCE) and b.worker.has_room()
+    for number in range(4, 8):
+        b.frame(number)
     b.wait(8)
-    sender.join(PATIENCE)
     assert [number for _, number in b.tracker.calls] == list(range(8))
     assert b.worker.dropped_frames == 0
-
-
-def test_stop_releases_a_waiting_sender(bench):
-    b = bench(BoundedMailbox(1))
-    b.worker.initialize(BOX)
-    b.hold()
-    b.frame(0)
-    b.stuck()
-    sender = threading.Thread(target=lambda: [b.frame(number) for number in range(1, 4)])
-    sender.start()
-    assert not b.worker.stop(timeout=0.05)
-    sender.join(PATIENCE)
-    assert not sender.is_alive()
 
 
 def test_nothing_is_delivered_after_stop(bench):
@@ -194,12 +203,12 @@ def test_nothing_is_delivered_after_stop(bench):
 
 
 def test_stop_before_start_and_twice():
-    worker = TrackerWorker(Recorder(), print, mailbox=LatestMailbox(),
-                           history=FrameHistory(1.0, 1))
+    worker = TrackerWorker(Recorder(), print, mailbox=LatestMailbox(), on_fault=print,
+                           history=FrameHistory(1.0, 1, 1))
     assert worker.stop() and worker.stop()
 
 
-@pytest.mark.parametrize('mailbox', [LatestMailbox(), BoundedMailbox(50)])
+@pytest.mark.parametrize('mailbox', [LatestMailbox(), BoundedMailbox(50, int)])
 def test_commands_keep_their_place_between_frames(bench, mailbox):
     b = bench(mailbox)
     b.frame(1)
@@ -350,24 +359,196 @@ def test_refusals_do_not_pile_up_behind_a_busy_tracker(bench):
     b.stuck()
     for _ in range(1000):
         b.worker.initialize(BOX, SECOND)
-    assert len(b.worker._mailbox._items) == 1
+    assert len(b.worker._mailbox) == 1
     b.tracker.gate.set()
     assert b.wait(4).phase is Phase.REFUSED
 
 
-def test_commands_wait_for_room_where_all_is_kept(bench):
-    b = bench(BoundedMailbox(2))
+@pytest.mark.parametrize('mailbox', [LatestMailbox(), BoundedMailbox(2, int)])
+def test_flood_of_requests_neither_waits_nor_piles_up(bench, mailbox):
+    b = bench(mailbox)
+    for number in range(3):
+        b.frame(number)
+        b.wait(number + 1)
+    b.worker.initialize(BOX)
+    b.wait(4)
+    b.hold()
+    b.frame(3)
+    b.stuck()
+    for _ in range(300):
+        b.worker.reset()
+        b.worker.set_enabled(False)
+        b.worker.initialize(BOX, SECOND)
+        b.worker.set_enabled(True)
+        b.worker.initialize(BOX)
+        b.worker.initialize(BOX, 0)
+    # A start and the three frames behind it.
+    assert len(mailbox) == 4
+    b.tracker.gate.set()
+    b.wait(5 + 4)
+    assert [number for _, number in b.tracker.calls[-4:]] == [0, 1, 2, 3]
+
+
+def test_flood_of_starts_on_coming_frames_does_not_pile_up(bench):
+    mailbox = LatestMailbox()
+    b = bench(mailbox)
     b.worker.initialize(BOX)
     b.hold()
     b.frame(0)
     b.stuck()
-    sender = threading.Thread(target=lambda: [b.worker.reset() for _ in range(50)])
-    sender.start()
-    sender.join(0.1)
-    assert sender.is_alive() and len(b.worker._mailbox._items) == 2
+    for number in range(1, 100):
+        b.worker.initialize(BOX, number * SECOND)
+        b.frame(number)
+    assert len(mailbox) == 1 and b.worker.dropped_frames == 98
     b.tracker.gate.set()
-    sender.join(PATIENCE)
-    assert not sender.is_alive()
+    b.wait(2)
+    assert b.tracker.calls[-1] == ('initialize', 99)
+
+
+@pytest.mark.parametrize('mailbox', [LatestMailbox(), BoundedMailbox(50, int)])
+def test_reset_supersedes_a_catch_up(bench, mailbox):
+    b = bench(mailbox)
+    for number in range(5):
+        b.frame(number)
+        b.wait(number + 1)
+    b.hold()
+    b.worker.initialize(BOX, 0)
+    b.stuck()
+    b.frame(5)
+    b.worker.reset()
+    b.frame(6)
+    b.tracker.gate.set()
+    outcome = b.wait_for(lambda outcome: outcome.frame.stamp == 6 * SECOND)
+    assert outcome.phase is Phase.IDLE
+    assert b.tracker.calls == [('initialize', 0)]
+
+
+def test_reset_answers_what_waits_without_a_target(bench):
+    b = bench(BoundedMailbox(50, int))
+    b.worker.initialize(BOX)
+    b.hold()
+    b.frame(0)
+    b.stuck()
+    b.frame(1)
+    b.worker.initialize(BOX, 2 * SECOND)
+    b.frame(2)
+    b.frame(3)
+    b.worker.reset()
+    b.worker.initialize(BOX, 4 * SECOND)
+    b.frame(4)
+    b.tracker.gate.set()
+    b.wait(5)
+    assert [o.phase for o in b.outcomes] == [
+        Phase.TRACKED, Phase.IDLE, Phase.IDLE, Phase.IDLE, Phase.TRACKED]
+    assert b.outcomes[-1].track_id == 2
+
+
+def test_start_keeps_its_place_before_the_frames_that_came_later(bench):
+    b = bench(BoundedMailbox(50, int))
+    b.frame(0)
+    b.wait(1)
+    b.worker.initialize(BOX)
+    b.wait(2)
+    b.hold()
+    b.frame(1)
+    b.stuck()
+    b.worker.initialize(BOX)
+    b.frame(2)
+    b.worker.initialize(BOX)
+    b.tracker.gate.set()
+    b.wait(5)
+    assert [o.track_id for o in b.outcomes] == [0, 1, 1, 2, 2] + [3] * (len(b.outcomes) - 5)
+
+
+def test_images_are_read_by_the_thread_and_only_those_that_are_needed(bench):
+    b = bench()
+    b.worker.initialize(BOX)
+    b.hold()
+    first = b.frame(0)
+    b.stuck()
+    dropped, last = b.frame(1), b.frame(2)
+    b.tracker.gate.set()
+    b.wait(2)
+    assert (first.reads, dropped.reads, last.reads) == (1, 0, 1)
+    assert (b.outcomes[-1].image == 2).all()
+
+
+@pytest.mark.parametrize('error, faults', [(ImageError('cut off'), 0), (MemoryError('too big'), 1)])
+def test_unreadable_image_costs_that_image_only(bench, error, faults):
+    b = bench()
+    b.worker.initialize(BOX)
+    b.frame(0)
+    b.wait(1)
+    b.frame(1, error=error)
+    outcome = b.wait(2)
+    assert outcome.phase is Phase.REFUSED and str(error) in outcome.error
+    assert outcome.image is None and len(b.faults) == faults
+    b.frame(2)
+    assert (b.wait(3).phase, b.wait(3).track_id) == (Phase.TRACKED, 1)
+    # The newest image that can be read is the one to start on.
+    b.frame(3, error=error)
+    b.wait(4)
+    b.worker.initialize(BOX)
+    assert (b.wait(5).phase, b.wait(5).image[0, 0]) == (Phase.TRACKED, 2)
+
+
+def test_start_waits_for_an_image_that_can_be_read(bench):
+    b = bench()
+    b.worker.initialize(BOX)
+    b.frame(0, error=ImageError('cut off'))
+    assert b.wait(1).phase is Phase.REFUSED
+    b.frame(1)
+    assert (b.wait(2).phase, b.wait(2).track_id) == (Phase.TRACKED, 1)
+    b.worker.initialize(BOX, 2 * SECOND)
+    b.frame(2, error=ImageError('cut off'))
+    assert b.wait(3).phase is Phase.REFUSED
+    # It was to start on that frame; another one shows the target elsewhere.
+    b.frame(3)
+    assert (b.wait(4).phase, b.wait(4).track_id) == (Phase.TRACKED, 1)
+
+
+def test_start_that_waits_is_forgotten_by_a_reset_while_its_image_is_read(bench):
+    b = bench()
+    reset = Pixels(np.zeros((2, 2)), ImageError('cut off'))
+    reset.read = lambda read=reset.read: (b.worker.reset(), read())
+    b.worker.initialize(BOX)
+    b.worker.submit(Frame(reset, 0, time.monotonic()))
+    b.wait(1)
+    b.frame(1)
+    assert b.wait(2).phase is Phase.IDLE
+
+
+@pytest.mark.parametrize('error', [MemoryError(), SystemExit(3), RuntimeError('no publisher')])
+def test_thread_survives_whatever_delivering_raises(bench, error):
+    b = bench()
+    deliver, failing = b.worker._deliver, [error]
+
+    def fail_once(outcome):
+        if failing:
+            raise failing.pop()
+        deliver(outcome)
+    b.worker._deliver = fail_once
+    b.frame(0)
+    b.frame(1)
+    b.worker.initialize(BOX)
+    b.wait_for(lambda outcome: outcome.phase is Phase.TRACKED)
+    assert b.faults == [('answering an image', error)]
+
+
+def test_catch_up_is_bounded_in_bytes(bench):
+    size = np.full((2, 2), 0).nbytes
+    b = bench(nbytes=3 * size)
+    for number in range(9):
+        b.frame(number)
+    b.wait(1)
+    b.hold()
+    b.worker.initialize(BOX, 6 * SECOND)
+    b.stuck()
+    for number in range(9, 30):
+        b.frame(number)
+    b.tracker.gate.set()
+    b.wait_for(lambda outcome: outcome.frame.stamp == 29 * SECOND)
+    assert [number for _, number in b.tracker.calls[1:]] == [7, 8, 9, 10, 11, 29]
 
 
 def test_time_with_one_frame_is_told(bench):
@@ -401,19 +582,42 @@ STAMPS = st.lists(st.integers(0, 30), min_size=1, max_size=30)
 
 @given(STAMPS, st.integers(1, 10), st.integers(0, 10))
 def test_history_is_ordered_and_bounded(stamps, frames, seconds):
-    history = FrameHistory(seconds, frames)
+    history = FrameHistory(seconds, frames, 10 ** 6)
     for stamp in stamps:
-        history.add(Frame(np.zeros((1, 1)), stamp * SECOND, 0.0))
+        history.add(Frame(Pixels(np.zeros((1, 1))), stamp * SECOND, 0.0))
         kept = [frame.stamp // SECOND for frame in history]
         assert kept[-1] == stamp and kept == sorted(kept)
         assert len(kept) <= frames and kept[0] >= stamp - seconds
 
 
+@given(st.lists(st.integers(1, 50), min_size=1, max_size=30), st.integers(1, 100))
+def test_history_is_bounded_in_bytes_and_keeps_the_newest(sizes, nbytes):
+    history = FrameHistory(100, 100, nbytes)
+    for stamp, size in enumerate(sizes):
+        history.add(Frame(Pixels(np.zeros(size, np.uint8)), stamp, 0.0))
+        assert history.last.stamp == stamp
+        assert len(history) == 1 or sum(frame.nbytes for frame in history) <= nbytes
+    kept = [frame.nbytes for frame in history]
+    # No more were forgotten than had to be.
+    assert kept == sizes or sum(sizes[-len(kept) - 1:]) > nbytes
+
+
+def test_history_forgets_a_frame_with_its_bytes():
+    history = FrameHistory(100, 100, 20)
+    frames = [Frame(Pixels(np.zeros(10, np.uint8)), stamp, 0.0) for stamp in range(3)]
+    for frame in frames[:2]:
+        history.add(frame)
+    history.discard(frames[1])
+    history.discard(frames[2])
+    history.add(frames[2])
+    assert list(history) == [frames[0], frames[2]]
+
+
 @given(STAMPS)
 def test_history_finds_the_frame_and_all_later_ones(stamps):
-    history = FrameHistory(100, 100)
+    history = FrameHistory(100, 100, 10 ** 6)
     for stamp in sorted(stamps):
-        history.add(Frame(np.zeros((1, 1)), stamp, 0.0))
+        history.add(Frame(Pixels(np.zeros((1, 1))), stamp, 0.0))
     for stamp in range(32):
         expected = [s for s in sorted(stamps) if s >= stamp] if stamp in stamps else []
         assert [frame.stamp for frame in history.since(stamp)] == expected
