@@ -60,7 +60,7 @@ class GuardedExecutor(SingleThreadedExecutor):
         Raises
         ------
         rclpy.executors.ExternalShutdownException
-            When the context is at its end; whatever rclpy raises because of that, as well.
+            When the context is at its end.
 
         """
         try:
@@ -69,7 +69,7 @@ class GuardedExecutor(SingleThreadedExecutor):
             raise
         except Exception as error:  # noqa: B902
             if not self.context.ok():
-                raise
+                raise ExternalShutdownException() from error
             self._note('work of the executor', error)
             time.sleep(_PAUSE)
 

@@ -126,6 +126,11 @@ class GuardedNode(LifecycleNode):
         answering = self._answering(srv_type, name, callback)
         return super().create_service(srv_type, srv_name, answering, **kwargs)
 
+    def destroy_node(self) -> None:
+        """Take the node away, with the services of its transitions, which rclpy forgets."""
+        super().destroy_node()
+        self._state_machine.destroy_when_not_in_use()
+
     def _answering(self, kind: Any, name: str, callback: Answer) -> Answer:
         """Return the callback of a service so that it answers whatever is asked."""
         @functools.wraps(callback)

@@ -61,7 +61,7 @@ def set_each(answer: Answer) -> Answer:
                        response: SetParameters.Response) -> SetParameters.Response:
         for parameter in request.parameters:
             one = SetParameters.Request(parameters=[parameter])
-            reason = _type_objection([parameter])
+            reason = _objection([parameter])
             answered = refusal(SetParameters, one, reason) if reason \
                 else answer(one, SetParameters.Response())
             response.results.extend(answered.results)
@@ -70,12 +70,12 @@ def set_each(answer: Answer) -> Answer:
 
 
 def set_together(answer: Answer) -> Answer:
-    """Return the callback of set_parameters_atomically so that unknown types are refused."""
+    """Return the callback of set_parameters_atomically so that rclpy can judge them all."""
     @functools.wraps(answer)
     def set_parameters(
             request: SetParametersAtomically.Request,
             response: SetParametersAtomically.Response) -> SetParametersAtomically.Response:
-        reason = _type_objection(request.parameters)
+        reason = _objection(request.parameters)
         return refusal(SetParametersAtomically, request, reason) if reason \
             else answer(request, response)
     return set_parameters
@@ -106,10 +106,12 @@ def transition_objection(transition: Transition, state: str,
             + (expected or 'none, start the node anew'))
 
 
-def _type_objection(parameters: Iterable[ParameterMessage]) -> str:
-    """Name the first parameter with a type that there is not; empty when there is none."""
+def _objection(parameters: Iterable[ParameterMessage]) -> str:
+    """Name what no parameter can be; empty when rclpy may judge them."""
     known = [kind.value for kind in Parameter.Type]
     for parameter in parameters:
+        if not parameter.name:
+            return 'a parameter without a name cannot be set; expected one of those listed'
         if parameter.value.type not in known:
             return (f'{parameter.name}: {parameter.value.type} is no type of a value; expected '
                     f'{min(known)} to {max(known)}, see rcl_interfaces/msg/ParameterType')

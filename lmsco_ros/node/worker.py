@@ -237,7 +237,6 @@ class TrackerWorker:
         except LMSCOError as error:
             self._set_aside(item, str(error), started)
         except Exception as error:  # noqa: B902
-            self._on_fault('reading an image', error)
             self._set_aside(item, f'the image cannot be read: {type(error).__name__}: {error}',
                             started)
         else:

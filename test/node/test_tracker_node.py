@@ -265,7 +265,7 @@ def test_detections_are_empty_without_a_box(run, monkeypatch):
     detections = []
     listener = Mock(publish=detections.append, get_subscription_count=lambda: 1)
     monkeypatch.setattr('lmsco_ros.node.outputs.Outputs._detections_publisher',
-                        lambda self: listener)
+                        lambda self, made: listener)
     monkeypatch.setattr('lmsco_ros.node.outputs.detections_from_box',
                         lambda box, **values: (box, values))
     running = run()

@@ -473,8 +473,8 @@ def test_images_are_read_by_the_thread_and_only_those_that_are_needed(bench):
     assert (b.outcomes[-1].image == 2).all()
 
 
-@pytest.mark.parametrize('error, faults', [(ImageError('cut off'), 0), (MemoryError('too big'), 1)])
-def test_unreadable_image_costs_that_image_only(bench, error, faults):
+@pytest.mark.parametrize('error', [ImageError('cut off'), MemoryError('too big')])
+def test_unreadable_image_costs_that_image_only(bench, error):
     b = bench()
     b.worker.initialize(BOX)
     b.frame(0)
@@ -482,7 +482,7 @@ def test_unreadable_image_costs_that_image_only(bench, error, faults):
     b.frame(1, error=error)
     outcome = b.wait(2)
     assert outcome.phase is Phase.REFUSED and str(error) in outcome.error
-    assert outcome.image is None and len(b.faults) == faults
+    assert outcome.image is None and not b.faults
     b.frame(2)
     assert (b.wait(3).phase, b.wait(3).track_id) == (Phase.TRACKED, 1)
     # The newest image that can be read is the one to start on.
