@@ -137,7 +137,7 @@ def test_init_while_disabled_is_refused_with_the_remedy(running):
 
 
 @pytest.mark.parametrize('spoil, reason', [
-    (lambda image: setattr(image, 'encoding', 'yuv422'), 'yuv422'),
+    (lambda image: setattr(image, 'encoding', 'h264'), 'h264'),
     (lambda image: setattr(image, 'data', image.data[:-1]), 'truncated'),
     (lambda image: setattr(image, 'step', 3), 'step is 3'),
 ])
