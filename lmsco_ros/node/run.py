@@ -24,12 +24,12 @@ import threading
 
 import rclpy
 from rclpy.exceptions import NameValidationException, ParameterException
-from rclpy.executors import SingleThreadedExecutor
 from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.logging import LoggingSeverity, set_logger_level
 from rclpy.signals import SignalHandlerOptions
 
 from lmsco_ros.node import parameter_files
+from lmsco_ros.node.executor import GuardedExecutor
 from lmsco_ros.node.ros_arguments import (check_remappings, explained, shortened, StartError,
                                           values_of)
 from lmsco_ros.node.tracker_node import TrackerNode
@@ -119,7 +119,7 @@ def _spin(node: TrackerNode, ending: threading.Event) -> int:
     """Let the node work until the process has to end."""
     if node.settings.autostart and not node.is_active:
         return 1
-    executor = SingleThreadedExecutor()
+    executor = GuardedExecutor(node.faults.note)
     try:
         _spare_the_garbage_collector()
         executor.add_node(node)
