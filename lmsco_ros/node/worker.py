@@ -64,7 +64,7 @@ class TrackerWorker:
 
     def __init__(self, tracker: Tracker, deliver: Callable[[Outcome], None], *,
                  mailbox: Mailbox[Item], history: FrameHistory[Frame],
-                 on_fault: Callable[[str, BaseException], None]) -> None:
+                 on_fault: Callable[[str, BaseException], object]) -> None:
         self._tracker = tracker
         self._deliver = deliver
         self._mailbox = mailbox

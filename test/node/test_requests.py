@@ -16,6 +16,7 @@
 
 from functools import partial
 import math
+import threading
 
 from diagnostic_msgs.msg import DiagnosticArray
 from lifecycle_msgs.msg import State, Transition
@@ -280,6 +281,7 @@ def test_activation_that_fails_late_leaves_nothing_behind(graph, monkeypatch):
     monkeypatch.setattr(node, 'create_subscription', fail_late)
     assert not change(graph, label='activate')
     assert not list(node.subscriptions)
+    assert 'tracker' not in [thread.name for thread in threading.enumerate()]
     monkeypatch.undo()
     assert change(graph, label='configure') and change(graph, label='activate')
     images = graph.publisher(Image, 'image_raw')

@@ -77,6 +77,22 @@ def test_all_leaves_images_with_the_middleware_while_there_is_no_room(run):
     assert [status.state for status in running.statuses] == ['tracking'] + 29 * ['idle']
 
 
+def test_executor_is_woken_when_there_is_room_again(run, monkeypatch):
+    running = run(frame_policy='all', queue_size=1)
+    running.start()
+    running.send()
+    running.fake.gate.clear()
+    running.images.publish(running.graph.image())
+    running.graph.spin_until(lambda: len(running.fake.calls) == 2)
+    running.images.publish(running.graph.image())
+    running.graph.spin_until(lambda: waiting(running) == 1)
+    woken = threading.Event()
+    monkeypatch.setattr(running.graph.executor, 'wake', woken.set)
+    assert not woken.is_set()
+    running.fake.gate.set()
+    assert woken.wait(40)
+
+
 @pytest.mark.parametrize('parameters', [{}, EVERY_IMAGE])
 def test_costly_image_is_decoded_beside_the_executor(run, monkeypatch, parameters):
     entered, done = threading.Event(), threading.Event()
