@@ -26,6 +26,7 @@ from builtin_interfaces.msg import Time
 from geometry_msgs.msg import PolygonStamped
 from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.qos import HistoryPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.serialization import deserialize_message
 from rclpy.subscription import Subscription
 from sensor_msgs.msg import CompressedImage, Image, RegionOfInterest
 from std_msgs.msg import Header
@@ -33,6 +34,7 @@ from std_msgs.msg import Header
 from lmsco_ros.core.errors import LMSCOError
 from lmsco_ros.core.types import BoundingBox
 from lmsco_ros.node.diagnostics import HealthMonitor, Problem
+from lmsco_ros.node.faults import cause
 from lmsco_ros.node.guarded_node import GuardedNode
 from lmsco_ros.node.history import NANOSECONDS
 from lmsco_ros.node.image_sources import (image_sources, other_image_topics, stale_message,
@@ -126,7 +128,7 @@ class Inputs:
             decode = functools.partial(image_from_compressed, limits=settings.decoding_limits)
         on_unheard = self._node.guarded(f'an event of {topic}', self._on_unheard)
         subscription = self._node.create_subscription(
-            kind, topic, lambda message: self._take(message, decode), qos,
+            kind, topic, lambda serialized: self._take(serialized, kind, decode), qos, raw=True,
             callback_group=WhileThereIsRoom(self._worker.has_room),
             event_callbacks=SubscriptionEventCallbacks(
                 incompatible_qos=on_unheard, incompatible_type=on_unheard))
@@ -142,14 +144,23 @@ class Inputs:
         if warning:
             self._node.get_logger().warning(warning)
 
-    def _take(self, message: Image | CompressedImage, decode: Callable) -> None:
-        received, stamp = time.monotonic(), _nanoseconds(message.header.stamp)
+    def _take(self, serialized: bytes, kind: type[Image] | type[CompressedImage],
+              decode: Callable) -> None:
+        received = time.monotonic()
+        try:
+            # It is what both begin with; the rest is read when its turn comes.
+            header = deserialize_message(serialized, Header)
+        except Exception as error:  # noqa: B902
+            self._refuse(Header(), f'what came in on {self.image_topic} does not begin as a '
+                         f'{kind.__name__} does: {cause(error)}')
+            return
+        stamp = _nanoseconds(header.stamp)
         if self._monitor.received(stamp):
             self._node.get_logger().warning(
                 'the stamps of the images went backwards; earlier images are forgotten, '
                 'tracking goes on', throttle_duration_sec=5.0)
-        self._worker.submit(Frame(ReceivedImage(message, decode, self._crop), stamp, received,
-                                  message.header))
+        self._worker.submit(Frame(ReceivedImage(serialized, kind, decode, self._crop), stamp,
+                                  received, header))
 
     def _on_region(self, region: RegionOfInterest) -> None:
         self._start(Header(), region, box_from_region, None)

@@ -20,8 +20,10 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
 import numpy.typing as npt
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
+from rclpy.serialization import deserialize_message
 from sensor_msgs.msg import CompressedImage, Image
 
 from lmsco_ros.core.errors import ImageError
@@ -29,18 +31,24 @@ from lmsco_ros.node.crop import Crop
 from msg_adapters.errors import MessageError
 
 
+# A message is held so often at once while it is made.
+_COPIES = 3
+
+
 @dataclass(frozen=True, eq=False)
 class ReceivedImage:
     """
-    A message that has not been decoded yet.
+    A message as it came over the wire.
 
-    rclpy makes a message anew for every one that it takes, and hands it to one subscription:
-    its memory is ours, and pixels may be read out of it without a copy.
+    rclpy hands the bytes over as an object of their own, and every reading makes a message of
+    them anew: nobody else writes its memory, and pixels may be read out of it without a copy.
 
     Parameters
     ----------
-    message : Image or CompressedImage
+    serialized : bytes
         As received.
+    kind : type
+        Image or CompressedImage.
     decode : callable
         Turns the message into pixels.
     crop : Crop
@@ -48,14 +56,15 @@ class ReceivedImage:
 
     """
 
-    message: Image | CompressedImage
+    serialized: bytes
+    kind: type[Image] | type[CompressedImage]
     decode: Callable[[Any], npt.NDArray]
     crop: Crop
 
     @property
     def nbytes(self) -> int:
-        """Size of the data of the message, in bytes."""
-        return len(self.message.data)
+        """Size of the message, in bytes."""
+        return len(self.serialized)
 
     def read(self) -> npt.NDArray:
         """
@@ -65,10 +74,15 @@ class ReceivedImage:
         ------
         ImageError
             When the message does not hold an image that can be used.
+        MemoryError
+            When there is not enough memory for it.
 
         """
+        # The generated code of the messages ends the process where memory is short.
+        np.empty(_COPIES * self.nbytes, np.uint8)
+        message = deserialize_message(self.serialized, self.kind)
         try:
-            return self.crop.cut(self.decode(self.message))
+            return self.crop.cut(self.decode(message))
         except MessageError as error:
             raise ImageError(str(error)) from error
 
