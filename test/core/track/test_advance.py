@@ -1,0 +1,378 @@
+# Copyright 2026 lmsco_ros contributors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""What a track does with a frame, line by line, each of its parts replaced."""
+
+from dataclasses import replace
+from unittest.mock import call, create_autospec, Mock
+
+import numpy as np
+import pytest
+
+from lmsco_ros.core import BoundingBox, BoxError, TrackerConfig, TrackState
+from lmsco_ros.core import track as track_module
+from lmsco_ros.core.config import LearningConfig, PresenceConfig, ScaleConfig
+from lmsco_ros.core.detection.detector import Detection
+from lmsco_ros.core.detection.scale import ScaleEstimator
+from lmsco_ros.core.fourier.localization import Peak
+from lmsco_ros.core.imaging.gain import FrameCondition, IntensityRange
+from lmsco_ros.core.imaging.view import FrameView
+from lmsco_ros.core.presence.evidence import Assessment, Evidence, Verdict
+from lmsco_ros.core.presence.observer import Outlook, Sighting
+from lmsco_ros.core.track import Track
+from lmsco_ros.core.weights.loading import Networks
+
+CONFIG = TrackerConfig(learning=LearningConfig(update_interval=2))
+START = BoundingBox(40, 30, 20, 10)
+AHEAD = START.moved_to((55, 36))
+REGION = BoundingBox(0, 0, 80, 80)
+FIRST_RANGE, RANGE = IntensityRange(0, 1), IntensityRange(10, 20)
+PLAIN = FrameCondition(RANGE, shutter_closed=False, inverted=False, cut=False)
+SHUT, CUT = replace(PLAIN, shutter_closed=True), replace(PLAIN, cut=True)
+BELIEVED = Verdict(0.8, TrackState.TRACKING, believed=True, learns=True)
+DOUBTED = Verdict(0.4, TrackState.UNCERTAIN, believed=True, learns=False)
+MISSED = Verdict(0.1, TrackState.UNCERTAIN, believed=False, learns=False)
+CLASSES = {'gain': 'AutomaticGain', 'detector': 'Detector', 'comparison': 'Comparison',
+           'monitor': 'PresenceMonitor', 'observer': 'Observer', 'prediction': 'Prediction',
+           'redetection': 'Redetection'}
+
+
+def sighting(center, presence, peak=3.0, box=START):
+    """Return something seen at a place, which the comparison gives log-odds."""
+    displacement = tuple((c - r) / 80 for c, r in zip(center, REGION.center, strict=True))
+    grid = np.arange(25.0).reshape(5, 5) * peak
+    found = Detection(REGION, Peak(displacement[::-1], 0, peak, grid, np.array([peak, 1.0])),
+                      [], np.zeros((3, 2)), 10.0)
+    return Sighting(box, found, Assessment(Evidence(10.0, 1.0, presence), 1.0, presence, 0.8))
+
+
+HERE, THERE = sighting((52, 36), 2.5), sighting((20, 60), -1.5)
+
+
+@pytest.fixture
+def parts(monkeypatch):
+    """Replace all that a track is made of; attributes are the parts, and calls are in order."""
+    parts = Mock()
+    for name, kind in CLASSES.items():
+        part = create_autospec(getattr(track_module, kind), instance=True)
+        parts.attach_mock(part, name)
+        monkeypatch.setattr(track_module, kind, Mock(return_value=part))
+    parts.attach_mock(create_autospec(ScaleEstimator, instance=True), 'scale')
+    monkeypatch.setattr(track_module, 'make_scale_estimator', Mock(return_value=parts.scale))
+    parts.gain.examine.return_value = replace(PLAIN, intensity=FIRST_RANGE)
+    parts.detector.return_value = sighting(START.center, 4.0, peak=2.0).detection
+    parts.monitor.believable.return_value = True
+    parts.monitor.judge.return_value = BELIEVED
+    parts.observer.look.return_value, parts.redetection.return_value = HERE, THERE
+    parts.prediction.expected.return_value, parts.prediction.misses = AHEAD, 0
+    parts.scale.search_factors = (0.9, 1.0)
+    parts.scale.found_factor.return_value = parts.scale.estimate.return_value = 1.0
+    return parts
+
+
+def image():
+    """Return a frame."""
+    return np.zeros((100, 120), np.uint8)
+
+
+def started(parts, config=CONFIG, networks=Networks()):
+    """Return a track whose first frame is forgotten by its parts."""
+    track = Track(config, 'backend', networks, image(), START)
+    parts.reset_mock()
+    parts.gain.examine.return_value = PLAIN
+    return track
+
+
+@pytest.fixture
+def track(parts):
+    """Return a track that has seen its first frame."""
+    return started(parts)
+
+
+def names(parts):
+    """Return what was called, in order."""
+    return [made[0] for made in parts.mock_calls]
+
+
+def test_plain_frame_is_seen_judged_followed_and_learned_in_this_order(parts, track):
+    track.advance(image())
+    parts.reset_mock()
+    track.advance(image())
+    assert names(parts) == [
+        'gain.examine', 'prediction.expected', 'observer.look', 'monitor.believable',
+        'monitor.judge', 'scale.found_factor', 'scale.estimate', 'prediction.seen',
+        'redetection.restart', 'observer.keep', 'detector.remember', 'detector.train',
+        'scale.learn', 'prediction.expected', 'detector.watch']
+
+
+def test_frame_is_examined_and_seen_in_its_range(parts, track):
+    shown = image()
+    track.advance(shown)
+    parts.gain.examine.assert_called_once_with(shown)
+    outlook, = parts.observer.look.call_args.args[:1]
+    assert outlook.view.image is shown and outlook.view.intensity is RANGE
+
+
+def test_target_is_looked_for_where_it_is_expected_at_the_searched_scales(parts, track):
+    shown = image()
+    track.advance(shown)
+    view = FrameView(shown, RANGE)
+    parts.observer.look.assert_called_once_with(
+        Outlook(view, START, AHEAD), (0.9, 1.0), None)
+    assert parts.prediction.expected.call_args_list[0] == call(START, (120, 100))
+
+
+def test_frame_is_judged_once_by_what_was_seen(parts, track):
+    result = track.advance(image())
+    parts.monitor.judge.assert_called_once_with(HERE.assessment)
+    assert (result.score, result.state) == (BELIEVED.score, BELIEVED.state)
+    assert result is track.result
+
+
+def test_believable_sighting_needs_no_search(parts, track):
+    track.advance(image())
+    parts.monitor.believable.assert_called_once_with(HERE.assessment)
+    parts.redetection.assert_not_called()
+
+
+def test_what_is_not_believable_is_searched_elsewhere_and_that_is_judged(parts, track):
+    parts.monitor.believable.return_value = False
+    parts.prediction.misses = 7
+    shown = image()
+    result = track.advance(shown)
+    assert parts.redetection.call_args_list == [call(
+        Outlook(FrameView(shown, RANGE), START, AHEAD), HERE, 7, after_shutter=False)]
+    parts.monitor.judge.assert_called_once_with(THERE.assessment)
+    parts.detector.remember.assert_called_once_with(THERE.detection)
+    assert result.box.center == pytest.approx(THERE.detection.center)
+
+
+def test_closed_shutter_shows_nothing_new(parts, track):
+    before = track.result
+    parts.gain.examine.return_value = SHUT
+    for _ in range(3):
+        assert track.advance(image()) is before
+    assert set(names(parts)) == {'gain.examine'}
+
+
+def test_first_frame_after_the_shutter_is_searched_whatever_is_seen(parts, track):
+    conditions = [SHUT, PLAIN, PLAIN]
+    parts.gain.examine.side_effect = conditions
+    for _ in conditions:
+        track.advance(image())
+    parts.redetection.assert_called_once()
+    assert parts.redetection.call_args.kwargs == {'after_shutter': True}
+
+
+def test_frames_of_a_closed_shutter_are_not_counted(parts, track):
+    parts.gain.examine.side_effect = [PLAIN, SHUT, PLAIN, PLAIN]
+    for _ in range(4):
+        track.advance(image())
+    # The filter is trained in the second frame that shows something.
+    assert [made for made in names(parts) if made in ('detector.train', 'observer.look')] == [
+        'observer.look', 'observer.look', 'detector.train', 'observer.look']
+
+
+def test_after_a_cut_nothing_is_expected_before_the_target_is_looked_for(parts, track):
+    parts.gain.examine.return_value = CUT
+    track.advance(image())
+    assert names(parts)[:7] == [
+        'gain.examine', 'monitor.note_cut', 'prediction.stop', 'redetection.restart',
+        'observer.forget', 'prediction.expected', 'observer.look']
+
+
+def test_frame_without_a_cut_forgets_nothing(parts, track):
+    track.advance(image())
+    for unwanted in ('monitor.note_cut', 'prediction.stop', 'observer.forget'):
+        assert unwanted not in names(parts)
+
+
+def test_comparison_of_the_frame_before_stands_in_frames_that_train(parts, track):
+    for _ in range(4):
+        track.advance(image())
+    assert [made.args[2] for made in parts.observer.look.call_args_list] == [None, 2.5, None, 2.5]
+
+
+def test_carried_comparison_is_that_of_what_was_judged(parts, track):
+    parts.monitor.believable.return_value = False
+    track.advance(image())
+    track.advance(image())
+    assert [made.args[2] for made in parts.observer.look.call_args_list] == [None, -1.5]
+
+
+def test_comparison_is_made_in_every_frame_where_every_frame_trains(parts):
+    track = started(parts, replace(CONFIG, learning=LearningConfig(update_interval=1)))
+    for _ in range(3):
+        track.advance(image())
+    assert [made.args[2] for made in parts.observer.look.call_args_list] == [None] * 3
+
+
+@pytest.mark.parametrize('verdict', [BELIEVED, DOUBTED], ids=['certain', 'doubted'])
+def test_believed_target_is_followed(parts, track, verdict):
+    parts.monitor.judge.return_value = verdict
+    result = track.advance(image())
+    parts.prediction.seen.assert_called_once_with(pytest.approx((52, 36)))
+    parts.prediction.missed.assert_not_called()
+    parts.redetection.restart.assert_called_once_with()
+    assert result.box.center == pytest.approx((52, 36)) and result.box.size == START.size
+    track.advance(image())
+    assert parts.observer.look.call_args.args[0].last == result.box
+
+
+def test_target_that_is_not_believed_stays_where_it_was_and_counts_as_missed(parts, track):
+    parts.monitor.judge.return_value = MISSED
+    result = track.advance(image())
+    assert result.box == START and result.state is MISSED.state
+    parts.prediction.missed.assert_called_once_with()
+    for unwanted in ('prediction.seen', 'redetection.restart', 'observer.keep',
+                     'detector.remember', 'detector.train', 'scale.estimate'):
+        assert unwanted not in names(parts)
+
+
+@pytest.mark.parametrize('verdict, distractors, kept', [
+    (BELIEVED, True, True), (DOUBTED, True, False), (BELIEVED, False, False)])
+def test_frame_is_kept_where_the_target_is_certain_and_distractors_are_asked_for(
+        parts, verdict, distractors, kept):
+    track = started(parts, replace(CONFIG, presence=PresenceConfig(distractors=distractors)))
+    parts.monitor.judge.return_value = verdict
+    shown = image()
+    result = track.advance(shown)
+    expected = [call(FrameView(shown, RANGE), result.box)] if kept else []
+    assert parts.observer.keep.call_args_list == expected
+
+
+def test_size_is_found_by_the_search_and_then_by_the_estimator(parts, track):
+    parts.scale.found_factor.return_value, parts.scale.estimate.return_value = 1.2, 1.5
+    shown = image()
+    result = track.advance(shown)
+    assert parts.scale.found_factor.call_args.args[0].tolist() == [3.0, 1.0]
+    view, moved = parts.scale.estimate.call_args.args
+    assert view.image is shown
+    assert moved.center == pytest.approx((52, 36)) and moved.size == pytest.approx((24, 12))
+    assert result.box.center == pytest.approx((52, 36))
+    assert result.box.size == pytest.approx((36, 18))
+
+
+@pytest.mark.parametrize('found, estimated', [(1e4, 1.0), (1.0, 1e4)])
+def test_size_remains_one_that_can_be_tracked(parts, track, found, estimated):
+    parts.scale.found_factor.return_value, parts.scale.estimate.return_value = found, estimated
+    track.advance(image())
+    track.advance(image())
+    last = parts.observer.look.call_args.args[0].last
+    assert max(last.size) == pytest.approx(2 * np.hypot(120, 100))
+    assert max(parts.scale.estimate.call_args.args[1].size) < 320 * found
+
+
+def test_size_is_that_of_the_sighting(parts, track):
+    parts.observer.look.return_value = sighting((52, 36), 2.5, box=START.scaled(2))
+    assert track.advance(image()).box.size == (40, 20)
+
+
+def test_target_beyond_the_border_is_followed_to_the_border(parts, track):
+    parts.observer.look.return_value = sighting((130, 36), 2.5)
+    track.advance(image())
+    parts.prediction.seen.assert_called_once_with(pytest.approx((120, 36)))
+
+
+def test_filter_learns_what_was_seen_and_trains_every_other_frame(parts, track):
+    for _ in range(4):
+        track.advance(image())
+    assert parts.detector.remember.call_args_list == 4 * [call(HERE.detection)]
+    assert parts.detector.train.call_args_list == 2 * [call()]
+    assert parts.scale.learn.call_count == 2
+
+
+def test_size_is_learned_at_the_new_place(parts, track):
+    track.advance(image())
+    shown = image()
+    result = track.advance(shown)
+    parts.scale.learn.assert_called_once_with(FrameView(shown, RANGE), result.box)
+
+
+def test_doubted_target_is_not_learned(parts, track):
+    parts.monitor.judge.return_value = DOUBTED
+    track.advance(image())
+    track.advance(image())
+    for unwanted in ('detector.remember', 'detector.train', 'scale.learn'):
+        assert unwanted not in names(parts)
+
+
+@pytest.mark.parametrize('verdict', [BELIEVED, MISSED], ids=['believed', 'missed'])
+def test_place_of_the_next_frame_is_watched_at_the_end(parts, track, verdict):
+    parts.monitor.judge.return_value = verdict
+    shown = image()
+    result = track.advance(shown)
+    assert names(parts)[-2:] == ['prediction.expected', 'detector.watch']
+    assert parts.prediction.expected.call_args == call(result.box, (120, 100))
+    parts.detector.watch.assert_called_once_with(FrameView(shown, RANGE), AHEAD)
+
+
+def test_map_is_the_score_in_units_of_the_first_frame(parts, track):
+    result = track.advance(image())
+    assert result.search_region == REGION
+    assert result.confidence_map.dtype == np.float32
+    assert result.confidence_map[2, 2] == 0 and result.confidence_map.max() == 3.0 * 24 / 2.0
+
+
+def test_told_size_leaves_out_what_cannot_be_measured(parts):
+    track = started(parts, replace(CONFIG, scale=ScaleConfig(tolerance=1.0)))
+    parts.scale.estimate.return_value = 1.05
+    assert track.advance(image()).box.size == pytest.approx(START.size)
+    # The tracker goes on with the size that was measured.
+    track.advance(image())
+    assert parts.observer.look.call_args.args[0].last.size == pytest.approx((21, 10.5))
+
+
+def test_told_box_is_the_visible_part(parts, track):
+    parts.observer.look.return_value = sighting((119, 36), 2.5)
+    assert track.advance(image()).box.as_tuple() == pytest.approx((109, 31, 11, 10))
+
+
+def test_parts_are_made_of_the_first_frame(parts, monkeypatch):
+    made = {name: getattr(track_module, kind) for name, kind in CLASSES.items()}
+    make_scale, shown = track_module.make_scale_estimator, image()
+    networks = Networks(comparison='network')
+    track = Track(CONFIG, 'backend', networks, shown, START)
+    view = FrameView(shown, FIRST_RANGE)
+    made['gain'].assert_called_once_with(CONFIG.intensity)
+    made['detector'].assert_called_once_with(CONFIG, 'backend', networks, view, START)
+    assert parts.detector.call_args_list == [call(view, START)]
+    made['comparison'].assert_called_once_with('network', view, START)
+    made['monitor'].assert_called_once_with(CONFIG.presence)
+    made['observer'].assert_called_once_with(
+        parts.detector, parts.comparison, parts.monitor, parts.detector.return_value)
+    made['redetection'].assert_called_once_with(
+        CONFIG.search, parts.observer, parts.monitor, view, START)
+    make_scale.assert_called_once_with(CONFIG.scale, START.size)
+    parts.scale.learn.assert_called_once_with(view, START)
+    parts.prediction.seen.assert_called_once_with(START.center)
+    parts.observer.keep.assert_called_once_with(view, START)
+    parts.detector.watch.assert_called_once_with(view, START)
+    assert (track.result.box, track.result.score) == (START, 1.0)
+    assert track.result.state is TrackState.TRACKING and track.result.search_region == REGION
+    # The target of the first frame scores 1.
+    assert track.result.confidence_map.max() == 24
+
+
+def test_nothing_is_compared_without_a_network(parts):
+    made = track_module.Observer
+    started(parts)
+    assert made.call_args.args[1] is None
+    track_module.Comparison.assert_not_called()
+
+
+def test_box_is_checked_against_the_image_first(parts):
+    with pytest.raises(BoxError, match='image of 120 x 100 pixels'):
+        Track(CONFIG, 'backend', Networks(), image(), BoundingBox(0, 0, 10, 110))
+    assert names(parts) == []
