@@ -1,0 +1,213 @@
+# Copyright 2026 lmsco_ros contributors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""What speaks for a detection: the detector, the comparison and the monitor are replaced."""
+
+from types import SimpleNamespace
+from unittest.mock import create_autospec
+
+import numpy as np
+import pytest
+
+from lmsco_ros.core import BoundingBox
+from lmsco_ros.core.config import PresenceConfig
+from lmsco_ros.core.imaging.gain import IntensityRange
+from lmsco_ros.core.imaging.view import FrameView
+from lmsco_ros.core.presence.comparison import Comparison
+from lmsco_ros.core.presence.evidence import Evidence
+from lmsco_ros.core.presence.monitor import PresenceMonitor
+from lmsco_ros.core.presence.observer import Observer, Outlook
+
+LAST = BoundingBox.from_center((100, 80), (20, 16))
+EXPECTED = BoundingBox.from_center((110, 84), (20, 20))
+TWIN = (160.0, 80.0)
+FIRST = SimpleNamespace(center=LAST.center, sharpness=10.0, likeness=0.5)
+
+
+class Detector:
+    """Sees the next of what it is told to see; near a place, something at that place."""
+
+    def __init__(self):
+        self.next, self.calls, self.neared = [], [], []
+
+    def __call__(self, view, box, factors=(1.0,)):
+        self.calls.append((view, box, factors))
+        return self.next.pop(0) if self.next else seen(box.center)
+
+    def likeness(self, detection):
+        return detection.likeness
+
+    def near(self, detection, place):
+        self.neared.append((detection, place))
+        return seen(place, detection.sharpness)
+
+
+def seen(center, sharpness=10.0, likeness=0.25):
+    """Return a detection of something like the target."""
+    return SimpleNamespace(center=center, sharpness=sharpness, likeness=likeness)
+
+
+@pytest.fixture
+def detector():
+    return Detector()
+
+
+@pytest.fixture
+def comparison():
+    """Return a comparison that gives everything log-odds of 3."""
+    comparison = create_autospec(Comparison, instance=True)
+    comparison.return_value = 3.0
+    return comparison
+
+
+@pytest.fixture
+def monitor():
+    return PresenceMonitor(PresenceConfig())
+
+
+@pytest.fixture
+def observer(detector, comparison, monitor):
+    return Observer(detector, comparison, monitor, FIRST)
+
+
+def view():
+    """Return a frame."""
+    return FrameView(np.zeros((240, 320), np.uint8), IntensityRange(0, 1))
+
+
+@pytest.fixture
+def outlook():
+    return Outlook(view(), LAST, EXPECTED)
+
+
+def test_target_is_looked_for_where_it_is_expected(observer, detector, outlook):
+    detector.next = [seen((112.0, 85.0))]
+    sighting = observer.look(outlook, (0.9, 1.0))
+    assert detector.calls == [(outlook.view, EXPECTED, (0.9, 1.0))]
+    assert sighting.box == EXPECTED and sighting.detection.center == (112.0, 85.0)
+    assert detector.neared == []
+
+
+def test_evidence_is_measured_against_first_frame_and_expected_place(
+        observer, detector, comparison, monitor, outlook):
+    detector.next = [seen((122.0, 89.0), sharpness=7.0, likeness=0.25)]
+    sighting = observer.look(outlook, (1.0,))
+    evidence = sighting.assessment.evidence
+    # The filter of the first frame says half of what it did there; the jump is 13 pixels.
+    assert evidence == Evidence(7.0, 0.5, 3.0, pytest.approx(13 / 20))
+    assert sighting.assessment == monitor.assess(evidence)
+
+
+def test_first_frame_and_found_place_are_compared_in_the_looked_for_size(
+        observer, detector, comparison, outlook):
+    detector.next = [seen((122.0, 89.0))]
+    observer.look(outlook, (1.0,))
+    assert [made.args for made in comparison.call_args_list] == [
+        (outlook.view, EXPECTED.moved_to((122.0, 89.0)))]
+
+
+def test_nothing_is_compared_without_a_network(detector, monitor, outlook):
+    observer = Observer(detector, None, monitor, FIRST)
+    assert observer.look(outlook, (1.0,)).assessment.evidence.presence is None
+
+
+def test_comparison_of_the_frame_before_stands_without_doubt(observer, comparison, outlook):
+    sighting = observer.look(outlook, (1.0,), presence=2.0)
+    assert sighting.assessment.evidence.presence == 2.0 and sighting.box == EXPECTED
+    comparison.assert_not_called()
+    # No doubt about zero either.
+    assert observer.look(outlook, (1.0,), presence=0.0).assessment.evidence.presence == 0.0
+
+
+def test_doubt_is_settled_by_a_comparison(observer, comparison, outlook):
+    sighting = observer.look(outlook, (1.0,), presence=-8.0)
+    comparison.assert_called_once()
+    assert sighting.assessment.evidence.presence == 3.0
+
+
+def test_detection_elsewhere_is_weighed_in_its_own_box(observer, detector, comparison, outlook):
+    box = BoundingBox.from_center((200, 150), (14, 11))
+    found = observer.detect(outlook, box)
+    assert detector.calls == [(outlook.view, box, (1.0,))]
+    sighting = observer.weigh(outlook, found, box)
+    assert (sighting.box, sighting.detection) == (box, found)
+    assert comparison.call_args.args == (outlook.view, box)
+    assert sighting.assessment.evidence.jump == pytest.approx(np.hypot(90, 66) / 20)
+
+
+@pytest.fixture
+def with_twin(observer, outlook):
+    """Return an observer that knows a distractor from a frame in which the target was certain."""
+    observer.keep(outlook.view, LAST)
+    assert observer.is_distractor(outlook, seen(TWIN))
+    return observer
+
+
+def test_what_was_there_beside_the_target_is_a_distractor(with_twin, detector, outlook):
+    # The kept frame was asked what it shows there, in the size of the target.
+    asked, box, _ = detector.calls[0]
+    assert np.array_equal(asked.image, outlook.view.image)
+    assert asked is not outlook.view and box == LAST.moved_to(TWIN)
+    assert detector.neared[0][1] == TWIN
+
+
+def test_what_was_not_there_is_none(observer, comparison, outlook):
+    comparison.return_value = -8.0
+    observer.keep(outlook.view, LAST)
+    assert not observer.is_distractor(outlook, seen(TWIN))
+
+
+def test_kept_frame_is_asked_for_the_peak_at_the_place_itself(observer, detector, outlook):
+    # Something else stands out in the region, and the comparison is made where it was asked for.
+    observer.keep(outlook.view, LAST)
+    detector.next = [seen((180.0, 90.0), likeness=-5.0)]
+    assert observer.is_distractor(outlook, seen(TWIN))
+    assert detector.neared[0][0].center == (180.0, 90.0)
+
+
+def test_without_a_kept_frame_there_is_no_distractor(observer, outlook):
+    assert not observer.is_distractor(outlook, seen(TWIN))
+
+
+def test_forgotten_distractors_are_none(with_twin, outlook):
+    with_twin.forget()
+    assert not with_twin.is_distractor(outlook, seen(TWIN))
+
+
+def test_target_is_looked_for_beside_a_distractor(with_twin, detector, outlook):
+    distractor = seen(TWIN)
+    detector.next, detector.neared = [distractor], []
+    sighting = with_twin.look(outlook, (1.0,))
+    assert detector.neared == [(distractor, EXPECTED.center)]
+    assert sighting.detection.center == EXPECTED.center
+
+
+def test_known_distractors_are_watched_where_they_were(with_twin, detector, outlook):
+    moved = (TWIN[0] + 10, TWIN[1])
+    detector.calls, detector.next = [], [seen(moved)]
+    with_twin.follow_distractors(outlook)
+    assert detector.calls == [(outlook.view, EXPECTED.moved_to(TWIN), (1.0,))]
+    # It has taken a step since, and is known at the new place: two steps would be too many.
+    detector.calls, detector.next = [], []
+    with_twin.follow_distractors(outlook)
+    assert detector.calls == [(outlook.view, EXPECTED.moved_to(moved), (1.0,))]
+
+
+def test_frames_are_counted_and_distractors_forgotten_in_time(with_twin, comparison, outlook):
+    comparison.return_value = -8.0
+    for _ in range(60):
+        with_twin.look(outlook, (1.0,))
+    assert with_twin.is_distractor(outlook, seen(TWIN))
+    with_twin.look(outlook, (1.0,))
+    assert not with_twin.is_distractor(outlook, seen(TWIN))

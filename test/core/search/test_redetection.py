@@ -1,0 +1,244 @@
+# Copyright 2026 lmsco_ros contributors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""What is looked at while the target is missing, and what of it is taken for the target."""
+
+from types import SimpleNamespace
+from unittest.mock import create_autospec, Mock
+
+import numpy as np
+import pytest
+
+from lmsco_ros.core import BoundingBox, TrackState
+from lmsco_ros.core.config import SearchConfig
+from lmsco_ros.core.imaging.gain import IntensityRange
+from lmsco_ros.core.imaging.regions import search_tiles
+from lmsco_ros.core.imaging.view import FrameView
+from lmsco_ros.core.presence.monitor import PresenceMonitor
+from lmsco_ros.core.presence.observer import Outlook
+from lmsco_ros.core.search import redetection as redetection_module
+from lmsco_ros.core.search.redetection import Redetection
+from lmsco_ros.core.search.salience import Salience
+
+IMAGE_SIZE, SIDE = (320, 240), 80.0
+CONFIG = SearchConfig(candidates=2, tiles=3)
+LAST = BoundingBox.from_center((60, 50), (20, 16))
+EXPECTED = BoundingBox.from_center((70, 60), (20, 16))
+# More than there are turns for: two in each of three frames.
+SALIENT = [BoundingBox.from_center((40 * n + 20, 200 - 10 * n), (14, 11)) for n in range(7)]
+
+
+class Observer:
+    """Sees, with a sharpness and a score for each place, what is told to be there."""
+
+    def __init__(self):
+        self.seen, self.looked, self.asked, self.distractors = {}, [], [], []
+        self.detected, self.followed = [], []
+
+    def put(self, place, **what):
+        """Let something be seen at a place; by default nothing is, of sharpness and score 0."""
+        self.seen[place] = what
+
+    def detect(self, outlook, box):
+        assert len(self.followed) == 1
+        self.detected.append(box)
+        what = {'sharpness': 0.0, 'center': box.center, **self.seen.get(box.center, {})}
+        return SimpleNamespace(region=BoundingBox.from_center(box.center, (99, 99)), **what)
+
+    def weigh(self, outlook, detection, box):
+        self.looked.append(box)
+        score = self.seen.get(box.center, {}).get('score', 0.0)
+        return SimpleNamespace(box=box, detection=detection,
+                               assessment=SimpleNamespace(score=score, place=box.center))
+
+    def is_distractor(self, outlook, detection):
+        self.asked.append(detection.center)
+        return detection.center in self.distractors
+
+    def follow_distractors(self, outlook):
+        self.followed.append(outlook)
+
+
+@pytest.fixture
+def observer():
+    return Observer()
+
+
+@pytest.fixture
+def monitor():
+    """Return a monitor in which the target is lost and everything convinces."""
+    monitor = create_autospec(PresenceMonitor, instance=True)
+    monitor.state, monitor.after_cut = TrackState.LOST, False
+    monitor.convincing.return_value = True
+    return monitor
+
+
+@pytest.fixture
+def salience(monkeypatch):
+    """Replace the salience: it always finds the same places."""
+    salience = create_autospec(Salience, instance=True)
+    salience.candidates.return_value = list(SALIENT)
+    monkeypatch.setattr(redetection_module, 'Salience', Mock(return_value=salience))
+    return salience
+
+
+@pytest.fixture
+def outlook():
+    image = np.zeros(IMAGE_SIZE[::-1], np.uint8)
+    return Outlook(FrameView(image, IntensityRange(0, 1)), LAST, EXPECTED)
+
+
+@pytest.fixture
+def here():
+    """Return what is where the target was expected; its score is 0.5."""
+    return SimpleNamespace(
+        detection=SimpleNamespace(region=BoundingBox.from_center(EXPECTED.center, (SIDE, SIDE))),
+        assessment=SimpleNamespace(score=0.5))
+
+
+@pytest.fixture
+def redetect(observer, monitor, salience, outlook, here):
+    """Return the search, as a function of the frames since the target was seen."""
+    redetection = Redetection(CONFIG, observer, monitor, outlook.view, LAST)
+
+    def search(misses=0, after_shutter=False):
+        for made in (observer.detected, observer.looked, observer.asked, observer.followed):
+            made.clear()
+        return redetection(outlook, here, misses, after_shutter=after_shutter)
+    search.restart = redetection.restart
+    return search
+
+
+def tiles():
+    """Return the tiles of the image, nearest first."""
+    return search_tiles(IMAGE_SIZE, SIDE, EXPECTED.center)
+
+
+def places(boxes):
+    """Return the centers of boxes."""
+    return [box.center for box in boxes]
+
+
+def test_salience_is_that_of_the_first_frame(redetect, outlook):
+    redetection_module.Salience.assert_called_once_with(outlook.view, LAST)
+
+
+def test_distractors_are_watched_first(redetect, observer, outlook):
+    redetect()
+    assert observer.followed == [outlook]
+
+
+@pytest.mark.parametrize('misses, chosen', [(0, slice(0, 2)), (4, slice(2, 4)), (2, slice(4, 6))])
+def test_lost_target_is_looked_for_at_salient_places_in_turn(
+        redetect, observer, salience, outlook, misses, chosen):
+    redetect(misses)
+    assert observer.detected == observer.looked == SALIENT[chosen]
+    salience.candidates.assert_called_once_with(outlook.view, EXPECTED, 6, (1.0,))
+
+
+def test_every_other_frame_of_a_lost_target_searches_tiles(redetect, observer, salience):
+    searched = []
+    for misses in (5, 7, 9):
+        redetect(misses)
+        searched += observer.detected[:3]
+        assert len(observer.detected) == 4
+    salience.candidates.assert_not_called()
+    assert places(searched) == tiles()[:9]
+    assert {box.size for box in searched} == {EXPECTED.size}
+
+
+@pytest.mark.parametrize('state', [TrackState.TRACKING, TrackState.UNCERTAIN])
+@pytest.mark.parametrize('misses', [1, 4])
+def test_target_that_is_not_lost_yet_is_looked_for_everywhere(
+        redetect, observer, monitor, state, misses):
+    monitor.state = state
+    redetect(misses)
+    assert observer.detected[:2] == SALIENT[2:4]
+    assert places(observer.detected[2:5]) == tiles()[:3]
+
+
+@pytest.mark.parametrize('misses', [0, 3])
+def test_two_slices_are_searched_after_the_shutter_and_the_salient_places(
+        redetect, observer, misses):
+    redetect(misses, after_shutter=True)
+    assert observer.detected[:2] == SALIENT[:2]
+    assert places(observer.detected[2:8]) == tiles()[:6] and len(observer.detected) == 9
+
+
+def test_other_sizes_are_considered_after_a_cut(redetect, monitor, salience, outlook):
+    monitor.after_cut = True
+    redetect()
+    salience.candidates.assert_called_once_with(outlook.view, EXPECTED, 6, (1.0, 0.7, 1.4))
+
+
+def test_restarted_search_begins_with_the_nearest_tiles(redetect, observer):
+    redetect(1)
+    redetect.restart()
+    redetect(3)
+    assert places(observer.detected[:3]) == tiles()[:3]
+
+
+def test_sharpest_tile_is_looked_at_again_where_its_peak_is(redetect, observer):
+    first, second, third = tiles()[:3]
+    observer.put(first, sharpness=3.0)
+    observer.put(second, sharpness=9.0, center=(33.0, 44.0))
+    observer.put(third, sharpness=6.0)
+    observer.put((33.0, 44.0), score=0.9)
+    found = redetect(1)
+    assert observer.looked == [EXPECTED.moved_to((33.0, 44.0))] == observer.detected[3:]
+    assert found.box == EXPECTED.moved_to((33.0, 44.0))
+
+
+def test_what_convinces_most_is_taken_for_the_target(redetect, observer, monitor):
+    monitor.state = TrackState.UNCERTAIN
+    observer.put(SALIENT[0].center, score=0.7)
+    observer.put(SALIENT[1].center, score=0.8)
+    assert redetect().box == SALIENT[1]
+    observer.put(tiles()[0], score=0.9, sharpness=5.0)
+    redetect.restart()
+    assert redetect().box.center == tiles()[0]
+    # Whether the best one is a distractor is asked first, and no other one then.
+    assert observer.asked == [tiles()[0]]
+
+
+def test_next_best_is_taken_where_the_best_does_not_convince(redetect, observer, monitor):
+    observer.put(SALIENT[0].center, score=0.7)
+    observer.put(SALIENT[1].center, score=0.8)
+    monitor.convincing.side_effect = lambda assessment: assessment.place == SALIENT[0].center
+    assert redetect().box == SALIENT[0]
+
+
+def test_distractor_is_not_taken_for_the_target(redetect, observer, here):
+    observer.put(SALIENT[0].center, score=0.7)
+    observer.put(SALIENT[1].center, score=0.8)
+    observer.distractors = [SALIENT[1].center]
+    assert redetect().box == SALIENT[0]
+    observer.distractors.append(SALIENT[0].center)
+    assert redetect() is here
+
+
+@pytest.mark.parametrize('score', [0.5, 0.4])
+def test_what_is_not_better_elsewhere_stays_here(redetect, observer, here, score):
+    observer.put(SALIENT[0].center, score=score)
+    assert redetect() is here
+    assert observer.asked == []
+
+
+@pytest.mark.parametrize('misses', [0, 1])
+def test_nothing_is_searched_where_nothing_is_asked_for(
+        observer, monitor, salience, outlook, here, misses):
+    redetection = Redetection(SearchConfig(0, 0), observer, monitor, outlook.view, LAST)
+    assert redetection(outlook, here, misses, after_shutter=True) is here
+    assert observer.detected == [] and observer.followed == [outlook]
+    salience.candidates.assert_not_called()
