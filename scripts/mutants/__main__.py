@@ -24,7 +24,7 @@ from __future__ import annotations
 
 import argparse
 from collections import Counter
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
@@ -93,9 +93,9 @@ def trials(repository: Path, rooms: Iterable[Room], module: str = '') -> list[Tr
 
 
 def outcomes(repository: Path, chosen: Sequence[Trial], processes: int,
-             contents: Sequence[str] = CONTENTS) -> list[Outcome]:
+             contents: Sequence[str] = CONTENTS) -> Iterator[Outcome]:
     """
-    Return what the tests made of each change.
+    Yield what the tests made of each change, in their order.
 
     Parameters
     ----------
@@ -131,7 +131,7 @@ def outcomes(repository: Path, chosen: Sequence[Trial], processes: int,
             finally:
                 free.put(workspace)
 
-        return list(executor.map(outcome, chosen))
+        yield from executor.map(outcome, chosen)
 
 
 def _time_limit(repository: Path, free: SimpleQueue[Workspace], trial: Trial) -> float:
@@ -151,7 +151,7 @@ def report(chosen: Sequence[Trial], found: Sequence[Outcome]) -> str:
     survivors = [trial for trial, outcome in zip(chosen, found, strict=True)
                  if outcome is Outcome.PASSED]
     lines = ['| not noticed at | it was | it became |', '|---|---|---|']
-    lines += [f'| {trial.module}:{trial.mutation.line} | `{_short(trial.mutation.before)}` | '
+    lines += [f'| {_place(trial)} | `{_short(trial.mutation.before)}` | '
               f'`{_short(trial.mutation.after)}` |' for trial in survivors]
     count, left = (Counter(trial.module for trial in some) for some in (chosen, survivors))
     lines += ['', '| module | changes | not noticed | share |', '|---|---:|---:|---:|']
@@ -166,6 +166,11 @@ def report(chosen: Sequence[Trial], found: Sequence[Outcome]) -> str:
 def _share(some: Sequence[Trial], all_of_them: Sequence[Trial]) -> float:
     """Return the part of all trials that some are."""
     return len(some) / len(all_of_them)
+
+
+def _place(trial: Trial) -> str:
+    """Return where the change is, as editors take it."""
+    return f'{trial.module}:{trial.mutation.line}'
 
 
 def _short(text: str) -> str:
@@ -189,7 +194,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if options.sample is not None and options.sample < len(chosen):
         places = random.Random(options.seed).sample(range(len(chosen)), options.sample)
         chosen = [chosen[place] for place in sorted(places)]
-    found = outcomes(REPOSITORY, chosen, options.processes)
+    found = []
+    for trial, outcome in zip(chosen, outcomes(REPOSITORY, chosen, options.processes),
+                              strict=True):
+        found.append(outcome)
+        if outcome is Outcome.PASSED:
+            print(f'{len(found)} of {len(chosen)}: {_place(trial)}', file=sys.stderr)
     print(report(chosen, found))
     return int(found.count(Outcome.PASSED) > MOST_SURVIVORS * len(chosen))
 

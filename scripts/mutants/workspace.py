@@ -117,6 +117,7 @@ def _run_tests(folder: str, tests: tuple[str, ...]) -> None:
     os.chdir(folder)
     os.environ.update(CI='1', PYTHONPATH=folder)
     sys.path.insert(0, folder)
+    sys.dont_write_bytecode = False
     import pytest
 
     os._exit(pytest.main(['-x', '-q', '-p', 'no:cacheprovider', *tests]))
