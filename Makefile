@@ -1,9 +1,10 @@
-# PYTHON=/path/to/python3.11 chooses the interpreter; PYTEST_ARGS adds to the test run.
+# PYTHON=/path/to/python3.11 chooses the interpreter; PYTEST_ARGS adds to the test run, and
+# MUTANTS_ARGS to the trial of the tests.
 BOOTSTRAP_PYTHON = $(shell command -v $(or $(PYTHON),python3))
 BIN = .venv/bin
 PYTEST_ARGS ?= -n 2
 
-.PHONY: demo docs test lint venv
+.PHONY: demo docs test lint mutants venv
 
 demo: venv
 	$(BIN)/lmsco demo
@@ -19,6 +20,10 @@ docs: venv
 	$(BIN)/python scripts/configuration_page.py
 	$(BIN)/python scripts/module_table.py
 	$(BIN)/python -m sphinx -W --keep-going -q docs build/docs
+
+# Whether the tests notice when the heart of the tracker is changed.
+mutants: venv
+	$(BIN)/python -m scripts.mutants $(MUTANTS_ARGS)
 
 venv:
 	@test -n "$(BOOTSTRAP_PYTHON)" || { echo 'lmsco_ros: $(or $(PYTHON),python3) is not there; install it: sudo apt install python3 python3-venv' >&2; exit 1; }

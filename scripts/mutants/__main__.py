@@ -155,17 +155,12 @@ def report(chosen: Sequence[Trial], found: Sequence[Outcome]) -> str:
               f'`{_short(trial.mutation.after)}` |' for trial in survivors]
     count, left = (Counter(trial.module for trial in some) for some in (chosen, survivors))
     lines += ['', '| module | changes | not noticed | share |', '|---|---:|---:|---:|']
-    lines += [f'| {module} | {count[module]} | {left[module]} | {left[module] / count[module]:.1%} |'
-              for module in count]
+    lines += [f'| {module} | {number} | {left[module]} | {left[module] / number:.1%} |'
+              for module, number in count.items()]
     endless = sum(outcome is Outcome.ENDLESS for outcome in found)
     return '\n'.join([*lines, '', (
         f'{len(chosen)} changes, {len(survivors)} not noticed '
-        f'({_share(survivors, chosen):.1%}), {endless} noticed by the time limit alone')])
-
-
-def _share(some: Sequence[Trial], all_of_them: Sequence[Trial]) -> float:
-    """Return the part of all trials that some are."""
-    return len(some) / len(all_of_them)
+        f'({len(survivors) / len(chosen):.1%}), {endless} noticed by the time limit alone')])
 
 
 def _place(trial: Trial) -> str:

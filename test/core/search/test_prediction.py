@@ -73,3 +73,61 @@ def test_expected_center_stays_in_the_image():
     for _ in range(10):
         prediction.missed()
         assert prediction.expected(box, SIZE).center[0] <= SIZE[0]
+
+
+def after_misses(*centers, misses=1):
+    """Return how far ahead a target is expected that was seen at some places, then missed."""
+    prediction = Prediction()
+    for center in centers:
+        prediction.seen(center)
+    for _ in range(misses):
+        prediction.missed()
+    box = BOX.moved_to(centers[-1])
+    return np.subtract(prediction.expected(box, SIZE).center, box.center)
+
+
+def test_new_target_was_never_missed():
+    assert Prediction().misses == 0
+
+
+def test_target_that_was_seen_once_stays():
+    assert after_misses((100, 100)) == pytest.approx((0, 0), abs=1e-12)
+
+
+def test_velocity_is_the_mean_of_the_steps_that_forgets():
+    assert after_misses((100, 100), (110, 80)) == pytest.approx((3, -6))
+    # Three tenths of the second step, and of the rest what was before it.
+    assert after_misses((100, 100), (110, 80), (110, 90)) == pytest.approx((2.1, -4.2 + 3))
+
+
+def test_velocity_fades_by_three_tenths_a_frame():
+    ahead = [after_misses((100, 100), (110, 80), misses=n)[0] for n in range(4)]
+    assert ahead == pytest.approx([0, 3, 3 * 1.7, 3 * (1 + 0.7 + 0.49)])
+
+
+def test_target_that_was_seen_again_begins_to_move_anew():
+    """The way that it took in the meantime says nothing of a frame."""
+    prediction = Prediction()
+    walk(prediction, (3, -1), 20)
+    prediction.missed()
+    prediction.seen((130, 90))
+    prediction.missed()
+    back = BOX.moved_to((130, 90))
+    assert prediction.expected(back, SIZE).center == pytest.approx(back.center, abs=1e-12)
+    prediction.seen((130, 90))
+    prediction.seen((140, 80))
+    prediction.missed()
+    there = BOX.moved_to((140, 80))
+    assert prediction.expected(there, SIZE).center == pytest.approx((143, 77))
+
+
+@pytest.mark.parametrize('step, border', [((-20, 0), (0, 100)), ((0, -20), (100, 0)),
+                                          ((30, 0), (320, 100)), ((0, 30), (100, 240))])
+def test_target_is_expected_at_the_border_at_most(step, border):
+    prediction, center = Prediction(), (100, 100)
+    while 0 <= center[0] <= SIZE[0] and 0 <= center[1] <= SIZE[1]:
+        prediction.seen(center)
+        last, center = center, (center[0] + step[0], center[1] + step[1])
+    for _ in range(10):
+        prediction.missed()
+    assert prediction.expected(BOX.moved_to(last), SIZE).center == border
