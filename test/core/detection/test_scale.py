@@ -35,19 +35,6 @@ CONFIG = ScaleConfig(estimator='filter', step=1.03, exponent_min=-8, exponent_ma
 CENTER = (83.3, 60.7)
 
 
-@pytest.fixture
-def view(make_scene):
-    """Return the function that shows a target of some size."""
-    scene = make_scene()
-    gain = AutomaticGain(IntensityConfig())
-
-    def show(target, center=CENTER):
-        image = scene.frame(center, target)
-        return FrameView(image, gain.observe(image))
-
-    return show
-
-
 def scaled(size, factor):
     """Return a size, enlarged."""
     return size[0] * factor, size[1] * factor
@@ -246,3 +233,24 @@ def test_same_size_stays_and_noise_of_a_small_target_is_not_a_change():
     assert steady(first.scaled(2.0), first.size, 0.5).width == pytest.approx(23, abs=0.1)
     large = BoundingBox.from_center(CENTER, (120.0, 120.0))
     assert steady(large.scaled(1.03), large.size, 0.5).width == pytest.approx(123.1, abs=0.05)
+
+
+@pytest.mark.parametrize('values, exponent', [
+    ([1, 3, 2, 0], -1 + 1 / 6), ([0, 2, 3, 1], 0 - 1 / 6), ([0, 2, 4, 2], 0),
+    ([9, 3, 2, 1], -2), ([1, 2, 3, 9], 1), ([4, 4, 4, 4], -2), ([1, 4, 4, 1], -0.5)])
+def test_search_is_refined_by_the_parabola_through_the_best_scores(values, exponent):
+    estimator = ScaleSearch(ScaleConfig(step=1.1, exponent_min=-2, exponent_max=1))
+    assert estimator.found_factor(np.array(values, float)) == pytest.approx(1.1**exponent)
+
+
+def test_single_score_says_nothing_of_the_scale():
+    config = ScaleConfig(step=1.1, exponent_min=-2, exponent_max=1)
+    for estimator in (ScaleSearch(config), FixedScale(), ScaleFilter(CONFIG, (24.0, 18.0))):
+        assert estimator.found_factor(np.array([0.7])) == 1.0
+    assert FixedScale().found_factor(np.array([0.7, 0.9])) == 1.0
+
+
+@pytest.mark.parametrize('name, kind', [
+    ('filter', ScaleFilter), ('search', ScaleSearch), ('none', FixedScale)])
+def test_estimator_is_the_one_asked_for(name, kind):
+    assert type(make_scale_estimator(ScaleConfig(estimator=name), (24.0, 18.0))) is kind

@@ -16,11 +16,13 @@
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from lmsco_ros.core.config import PresenceConfig
 from lmsco_ros.core.presence.evidence import Evidence, Verdict
 from lmsco_ros.core.presence.monitor import PresenceMonitor
+from lmsco_ros.core.presence.trust import trust
 from lmsco_ros.core.types import TrackState
 
 CONFIG = PresenceConfig(reference_frames=4, uncertain=0.5, certain=0.6, lost=0.2,
@@ -210,3 +212,194 @@ def test_high_odds_are_no_measure_for_later_frames():
     for _ in range(120):
         judge(monitor, Evidence(10.0, presence=8.0))
     assert monitor.assess(Evidence(10.0, presence=3.0)).presence == 3.0
+
+
+HALF = Evidence(5.0, 0.5, 0.0)
+# Missed even by a monitor without a reference, to which every sharpness is as usual.
+NOTHING = Evidence(1.0, -0.5, -8.0)
+
+
+def first_score(evidence):
+    """Return the score of a frame while there is no reference."""
+    return PresenceMonitor(CONFIG).assess(evidence).score
+
+
+def with_thresholds(**thresholds):
+    """Return a monitor without a reference; what is not given is out of reach."""
+    return PresenceMonitor(replace(CONFIG, **thresholds))
+
+
+def test_score_that_is_just_enough_is_enough():
+    score = first_score(HALF)
+    assert judge(with_thresholds(uncertain=score, certain=1.0), HALF).state is TrackState.TRACKING
+    assert believable(with_thresholds(lost=score, uncertain=1.0, certain=1.0, found=1.0), HALF)
+    assert convincing(with_thresholds(found=score, alike=0.5), HALF)
+    monitor = with_thresholds(uncertain=score, certain=1.0)
+    assert monitor.beyond_doubt(monitor.assess(HALF)) and monitor.resembles(HALF)
+    assert believable(monitor, replace(HALF, jump=2.0))
+    above = float(np.nextafter(score, 1))
+    monitor = with_thresholds(uncertain=above, certain=1.0)
+    assert judge(monitor, HALF).state is TrackState.UNCERTAIN
+    assert not monitor.resembles(HALF) and not believable(monitor, replace(HALF, jump=2.0))
+    assert not convincing(with_thresholds(found=above), HALF)
+
+
+def test_uncertain_target_is_certain_again_at_just_enough():
+    monitor = with_thresholds(uncertain=0.9, certain=1.0)
+    judge(monitor, Evidence(1.0, 0.0, 0.0))
+    assert monitor.state is TrackState.UNCERTAIN
+    monitor.config = replace(monitor.config, certain=monitor.assess(CLEAR).score)
+    assert judge(monitor, CLEAR).state is TrackState.TRACKING
+
+
+def test_without_a_reference_every_sharpness_is_as_usual(monitor):
+    assert PresenceMonitor(CONFIG).assess(Evidence(0.1)).quality == 1
+    assert monitor.assess(Evidence(2.5)).quality == 0.25
+    assert monitor.assess(Evidence(1e-9)).quality == 1e-10
+
+
+def test_assessment_holds_what_it_is_made_of(monitor):
+    seen = monitor.assess(HALF)
+    assert (seen.evidence, seen.quality, seen.presence) == (HALF, 0.5, 0.0)
+    assert seen.score == trust(0.5, 0.5, 0.0)
+    assert monitor.assess(replace(HALF, presence=None)).presence is None
+
+
+def test_usual_odds_follow_those_of_certain_frames_by_three_in_a_hundred():
+    monitor = PresenceMonitor(CONFIG)
+    assert monitor.assess(HALF).presence == 0.0
+    judge(monitor, Evidence(10.0, presence=0.0))
+    # Usual are 4 - 0.03 * 4 from now on.
+    assert monitor.assess(HALF).presence == pytest.approx(0.12)
+    judge(monitor, Evidence(10.0, presence=1.0))
+    assert monitor.assess(HALF).presence == pytest.approx(0.12 + 0.03 * 2.88)
+
+
+def test_uncertain_frames_do_not_become_usual(monitor):
+    doubtful = at_score(monitor, 0.35)
+    before = monitor.assess(HALF).presence
+    for _ in range(9):
+        assert judge(monitor, doubtful).state is TrackState.UNCERTAIN
+    assert monitor.assess(HALF).presence == before
+
+
+def test_doubt_is_raised_by_state_cut_jump_and_score(monitor):
+    def beyond_doubt(evidence):
+        return monitor.beyond_doubt(monitor.assess(evidence))
+
+    assert beyond_doubt(CLEAR) and beyond_doubt(replace(CLEAR, jump=1.0))
+    assert not beyond_doubt(replace(CLEAR, jump=1.01))
+    assert beyond_doubt(at_score(monitor, 0.51)) and not beyond_doubt(at_score(monitor, 0.49))
+    monitor.note_cut()
+    assert not beyond_doubt(CLEAR)
+    judge(monitor, CLEAR)
+    assert beyond_doubt(CLEAR)
+    judge(monitor, at_score(monitor, 0.35))
+    assert not beyond_doubt(CLEAR)
+
+
+def test_target_that_goes_its_own_length_does_not_jump(monitor):
+    doubtful = at_score(monitor, 0.35)
+    assert believable(monitor, replace(doubtful, jump=1.0))
+
+
+@pytest.fixture
+def cut(monitor):
+    """Return a monitor after a cut, whose other thresholds are never reached."""
+    monitor.config = replace(CONFIG, found=0.95, certain=1.0)
+    monitor.note_cut()
+    return monitor
+
+
+def test_after_a_cut_half_of_sharpness_and_likeness_is_enough(cut):
+    # Two tenths of the reference, 0.15 of the first filter, and log-odds of -2.
+    cut.config = replace(cut.config, found=0.2)
+    assert convincing(cut, Evidence(2.0, 1.0, 4.0)) and not convincing(cut, Evidence(1.99, 1.0, 4))
+    assert convincing(cut, Evidence(9.0, 0.15, 4.0)) and not convincing(cut, Evidence(9, 0.149, 4))
+    assert convincing(cut, Evidence(9.0, 1.0, -2.0)) and not convincing(cut, Evidence(9, 1, -2.01))
+
+
+def test_otherwise_all_of_it_is_needed(monitor):
+    monitor.config = replace(CONFIG, found=0.2)
+    assert convincing(monitor, Evidence(4.0, 1.0, 4.0))
+    assert not convincing(monitor, Evidence(3.99, 1.0, 4.0))
+    assert convincing(monitor, Evidence(9.0, 0.3, 4.0))
+    assert not convincing(monitor, Evidence(9.0, 0.299, 4.0))
+    assert convincing(monitor, Evidence(9.0, 1.0, 0.0))
+    assert not convincing(monitor, Evidence(9.0, 1.0, -0.01))
+
+
+def test_after_a_cut_a_score_of_four_fifths_is_enough(cut):
+    assert convincing(cut, at_score(cut, 0.801)) and not convincing(cut, at_score(cut, 0.799))
+    cut.config = replace(cut.config, found=0.6, sharp=0.0)
+    assert convincing(cut, at_score(cut, 0.601)) and not convincing(cut, at_score(cut, 0.599))
+
+
+def test_what_looks_like_the_target_may_stand_beside_it(monitor):
+    """How sharp it is in a score that the target dominates says nothing."""
+    assert monitor.resembles(Evidence(0.1, 0.5, 0.0))
+    assert monitor.resembles(Evidence(10.0, 0.3, 4.0))
+    assert not monitor.resembles(Evidence(10.0, 0.299, 4.0))
+    assert not monitor.resembles(Evidence(10.0, 0.31, -8.0))
+    # A target of which the network thinks little is measured against that.
+    for _ in range(200):
+        judge(monitor, Evidence(10.0, presence=-4.0))
+    assert monitor.resembles(Evidence(10.0, 0.31, -5.0))
+
+
+def test_cut_is_over_when_the_target_is_seen(monitor):
+    monitor.note_cut()
+    judge(monitor, GONE)
+    assert monitor.after_cut
+    judge(monitor, CLEAR)
+    assert not monitor.after_cut
+
+
+def test_new_monitor_tracks_and_has_seen_no_cut():
+    monitor = PresenceMonitor(CONFIG)
+    assert monitor.state is TrackState.TRACKING and not monitor.after_cut
+    states = [judge(monitor, NOTHING).state for _ in range(3)]
+    assert states == [TrackState.UNCERTAIN] * 2 + [TrackState.LOST]
+
+
+def test_missed_frame_counts_from_zero_after_the_target_was_seen(monitor):
+    judge(monitor, GONE)
+    judge(monitor, GONE)
+    judge(monitor, CLEAR)
+    states = [judge(monitor, GONE).state for _ in range(3)]
+    assert states == [TrackState.UNCERTAIN] * 2 + [TrackState.LOST]
+
+
+def test_lost_target_that_is_hardly_found_is_uncertain(monitor):
+    for _ in range(3):
+        judge(monitor, GONE)
+    monitor.config = replace(CONFIG, found=0.2, sharp=0.0)
+    hardly = at_score(monitor, 0.55)
+    assert judge(monitor, hardly).state is TrackState.UNCERTAIN
+    assert judge(monitor, replace(hardly, sharpness=2 * hardly.sharpness)).state is (
+        TrackState.TRACKING)
+
+
+def test_lost_target_is_still_lost_while_it_is_missed(monitor):
+    for _ in range(3):
+        judge(monitor, GONE)
+    monitor.config = replace(CONFIG, lost_frames=100)
+    assert judge(monitor, GONE).state is TrackState.LOST
+
+
+def test_missed_frames_set_no_reference_and_are_not_usual():
+    monitor = PresenceMonitor(CONFIG)
+    judge(monitor, NOTHING)
+    assert monitor.assess(Evidence(2.0)).quality == 1
+    assert monitor.assess(Evidence(2.0, presence=1.0)).presence == 1.0
+
+
+def test_reference_is_that_of_as_many_frames_as_asked_for(monitor):
+    """Four frames of sharpness 10, which nothing changes; three leave room for another one."""
+    young = PresenceMonitor(CONFIG)
+    for sharpness in (10.0, 10.0, 20.0):
+        judge(young, Evidence(sharpness, presence=4.0))
+    judge(young, Evidence(20.0, presence=4.0))
+    assert young.assess(Evidence(15.0)).quality == 1
+    judge(young, Evidence(20.0, presence=4.0))
+    assert young.assess(Evidence(15.0)).quality == 1

@@ -202,10 +202,11 @@ def polarity(rows):
     warm, cold = np.full((2, 96, 96), 0.5, np.float32)
     warm[20:36, 20:36] += 0.25
     cold[20:36, 20:36] -= 0.25
-    found = [bool(salience.candidates(FrameView(shown, IntensityRange(0.0, 1.0)), box, 1)[0].overlap(
-        BoundingBox(20, 20, 16, 16)) > 0.5) for shown in (warm, cold)]
-    assert found[0] != found[1]
-    return 1 if found[0] else -1
+    found = [salience.candidates(FrameView(shown, IntensityRange(0.0, 1.0)), box, 1)[0]
+             for shown in (warm, cold)]
+    right = [candidate.overlap(BoundingBox(20, 20, 16, 16)) > 0.5 for candidate in found]
+    assert right[0] != right[1]
+    return 1 if right[0] else -1
 
 
 @pytest.fixture
