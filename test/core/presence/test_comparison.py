@@ -61,3 +61,28 @@ def test_gain_and_offset_change_nothing(scene, comparison):
     image = scene.frame(CENTER).astype(np.float32)
     other = comparison(FrameView(3 * image + 100, IntensityRange(20800, 22900)), BOX)
     assert other == pytest.approx(odds(comparison, image), abs=1e-2)
+
+
+class Network:
+    """Encodes a patch as itself, and relates two by what they are."""
+
+    context, size = 2.0, 16
+
+    def encode(self, patch):
+        return patch
+
+    def reference(self, encoding):
+        return 'reference', encoding
+
+    def relate(self, reference, encoding):
+        return reference, encoding
+
+
+def test_region_of_the_first_box_is_related_to_that_of_another(scene):
+    first = FrameView(scene.frame(CENTER), COUNTS)
+    later, box = FrameView(scene.frame((90.0, 60.0)), COUNTS), BoundingBox(75, 52, 30, 12)
+    (name, reference), encoding = Comparison(Network(), first, BOX)(later, box)
+    assert name == 'reference'
+    # Twice as wide and as high as the box, in the size of the network's patches.
+    np.testing.assert_array_equal(reference, first.patch(BOX.scaled(2.0), (16, 16)))
+    np.testing.assert_array_equal(encoding, later.patch(BoundingBox(60, 46, 60, 24), (16, 16)))

@@ -41,3 +41,20 @@ def test_trust_is_the_logistic_function_of_the_weighted_hints():
 
 def test_values_that_are_no_numbers_speak_against_the_target():
     assert trust(1.0, float('nan'), float('nan')) == trust(1.0, -0.5, -8.0)
+
+
+@pytest.mark.parametrize('hints, limits', [
+    ((0.001, 0.5, 0.0), (0.02, 0.5, 0.0)), ((9.0, 0.5, 0.0), (5.0, 0.5, 0.0)),
+    ((1.0, -2.0, 0.0), (1.0, -0.5, 0.0)), ((1.0, 3.0, 0.0), (1.0, 1.5, 0.0)),
+    ((1.0, 0.5, -20.0), (1.0, 0.5, -8.0)), ((1.0, 0.5, 20.0), (1.0, 0.5, 8.0)),
+    ((float('inf'), 0.5, 0.0), (0.02, 0.5, 0.0))])
+def test_hints_count_up_to_their_limits(hints, limits):
+    def logistic(quality, likeness, presence):
+        odds = 1.26 * np.log(quality) + 1.53 * likeness + 0.42 * presence + 1.81
+        return 1 / (1 + np.exp(-odds))
+
+    assert trust(*hints) == pytest.approx(logistic(*limits), rel=1e-9)
+
+
+def test_what_is_not_compared_is_not_what_is_compared_without_a_result():
+    assert trust(0.5, 0.5, None) != trust(0.5, 0.5, 0.0)
