@@ -62,8 +62,9 @@ def fetch(
     force: Annotated[bool, typer.Option('--force', help='Also when they are here.')] = False,
 ) -> None:
     """Download weights; a download that was broken off goes on where it stopped."""
+    from lmsco_ros.core.weights.acquisition import fetch_weights, verify_weights
     from lmsco_ros.core.weights.registry import find_source
-    from lmsco_ros.core.weights.store import fetch_weights, locate, verify_weights
+    from lmsco_ros.core.weights.store import locate
 
     with plain_errors():
         source = find_source(name)
@@ -81,8 +82,8 @@ def fetch(
 
 def verify(name: NameArgument, directory: DirectoryOption = None) -> None:
     """Read weights in full and check that they are whole and fit their network."""
+    from lmsco_ros.core.weights.acquisition import verify_weights
     from lmsco_ros.core.weights.registry import find_source
-    from lmsco_ros.core.weights.store import verify_weights
 
     with plain_errors():
         found = verify_weights(name, directory)
@@ -99,7 +100,7 @@ def import_file(
     directory: DirectoryOption = None,
 ) -> None:
     """Convert a file that you have and put it where the tracker finds it."""
-    from lmsco_ros.core.weights.store import import_weights
+    from lmsco_ros.core.weights.acquisition import import_weights
 
     with plain_errors():
         say(f'{name} is here: {import_weights(file, name, directory)}')

@@ -17,9 +17,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+import sys
 
 import numpy.typing as npt
-import torch
 
 from lmsco_ros.core.types import BoundingBox, TrackResult, TrackState
 from lmsco_ros.node.outcome import Tracker
@@ -71,13 +71,14 @@ class FallbackTracker:
         """Return what comes of the work; None after a retreat to the processor."""
         try:
             return work()
-        except torch.cuda.OutOfMemoryError as error:
-            if self._device == 'cpu':
+        except RuntimeError as error:
+            if self._device == 'cpu' or not _is_out_of_memory(error):
                 raise
             reason = str(error)
         # Not in the handler: the error keeps everything alive that the tracker held.
         self._use(self._make('cpu'))
         self._device = 'cpu'
+        torch = sys.modules['torch']
         if torch.cuda.is_available():
             torch.cuda.empty_cache()
         self._warn('the GPU ran out of memory; tracking goes on, slower, on the processor until '
@@ -88,6 +89,8 @@ class FallbackTracker:
         self._tracker = tracker
 
     def _resume(self, image: npt.NDArray) -> TrackResult:
+        # Nothing is updated before a start, of which the frame is kept.
+        assert self._found is not None
         self._tracker.initialize(*self._found)
         self._found = None
         return self._tracker.update(image)
@@ -99,3 +102,13 @@ class FallbackTracker:
             # a larger message, or be written over by the next frame.
             self._found = image.copy(), result.box
         return result
+
+
+def _is_out_of_memory(error: RuntimeError) -> bool:
+    """
+    Tell whether an error is that of a GPU that has no memory left.
+
+    Only torch raises it, so that torch, which takes long to import, is there when it is.
+    """
+    torch = sys.modules.get('torch')
+    return torch is not None and isinstance(error, torch.cuda.OutOfMemoryError)

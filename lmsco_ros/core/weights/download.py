@@ -17,7 +17,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-import hashlib
 import os
 from pathlib import Path
 import re
@@ -28,8 +27,9 @@ from urllib3.exceptions import NewConnectionError, ReadTimeoutError
 from urllib3.util import Retry
 
 from lmsco_ros.core.errors import WeightsError
+from lmsco_ros.core.weights.checksum import file_sha256
 
-__all__ = ['Progress', 'download', 'file_sha256']
+__all__ = ['Progress', 'download']
 
 Progress = Callable[[int, int | None], None]
 
@@ -90,15 +90,6 @@ def download(url: str, path: Path, sha256: str | None = None,
                     raise WeightsError(f'{url} could not be downloaded: {_reason(error)}; try '
                                        'again later, what has arrived is kept') from error
     return partial.finish(sha256, url)
-
-
-def file_sha256(path: Path) -> str:
-    """Return the checksum of a file."""
-    digest = hashlib.sha256()
-    with path.open('rb') as file:
-        while chunk := file.read(1 << 20):
-            digest.update(chunk)
-    return digest.hexdigest()
 
 
 class _PartialFile:

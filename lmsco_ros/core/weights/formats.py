@@ -27,11 +27,9 @@ import zlib
 import numpy as np
 from safetensors import safe_open, SafetensorError
 from safetensors.numpy import load_file, save_file
-import torch
 
 from lmsco_ros.core.errors import WeightsError
-from lmsco_ros.core.weights.caffe_format import read_caffemodel
-from lmsco_ros.core.weights.matconvnet_format import read_matconvnet
+from lmsco_ros.extras import require_extra
 
 __all__ = ['LARGEST', 'READERS', 'declared_arrays', 'read_about', 'read_arrays', 'write_arrays']
 
@@ -61,6 +59,8 @@ def read_arrays(path: Path, limit: int = LARGEST) -> Arrays:
     ------
     WeightsError
         When the format is not known, or the file is damaged or larger than the limit.
+    MissingExtraError
+        When the format needs the extra `weights`, which is not installed.
 
     """
     reader = READERS.get(path.suffix.lower())
@@ -197,6 +197,8 @@ def _read_npz(path: Path, limit: int) -> Arrays:
 
 def _read_torch(path: Path, limit: int) -> Arrays:
     """Return the tensors of a state dictionary, alone or as `state_dict` of a checkpoint."""
+    import torch
+
     _check_checkpoint(path, limit)
     with path.open('rb') as file:
         try:
@@ -246,12 +248,26 @@ def _more_than_tensors(path: Path) -> WeightsError:
                         'a state dictionary; save network.state_dict() alone')
 
 
+def _read_matconvnet(path: Path, limit: int) -> Arrays:
+    """Return the arrays of a network of MatConvNet."""
+    from lmsco_ros.core.weights.matconvnet_format import read_matconvnet
+
+    return read_matconvnet(path, limit)
+
+
+def _read_caffemodel(path: Path, limit: int) -> Arrays:
+    """Return the arrays of a network of Caffe: as long in the file as in memory."""
+    require_extra('weights', f'{path.name}, a file of Caffe,')
+    from lmsco_ros.core.weights.caffe_format import read_caffemodel
+
+    return read_caffemodel(path)
+
+
 READERS: dict[str, Callable[[Path, int], Arrays]] = {
     '.safetensors': _read_safetensors,
     '.npz': _read_npz,
     '.pt': _read_torch,
     '.pth': _read_torch,
-    '.mat': read_matconvnet,
-    # Its numbers are as long in the file as in memory.
-    '.caffemodel': lambda path, limit: read_caffemodel(path),
+    '.mat': _read_matconvnet,
+    '.caffemodel': _read_caffemodel,
 }

@@ -12,51 +12,26 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""From a name to a network with its weights, and from published files to the common one."""
+"""From the name of weights to their file, and from that to a network that has them."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 import os
 from pathlib import Path
 
 import numpy as np
-import platformdirs
 
 from lmsco_ros.core.errors import WeightsError
 from lmsco_ros.core.networks.backbone import Backbone
-from lmsco_ros.core.weights.download import download, file_sha256, Progress
-from lmsco_ros.core.weights.formats import (
-    declared_arrays, read_about, read_arrays, READERS, write_arrays)
+from lmsco_ros.core.weights.formats import declared_arrays, read_arrays, READERS
 from lmsco_ros.core.weights.registry import find_source, WeightsSource
+from lmsco_ros.extras import require_extra
 
-__all__ = ['DIRECTORY_VARIABLE', 'Verification', 'fetch_weights', 'find_file', 'fitting_arrays',
-           'import_weights', 'load_backbone', 'locate', 'verify_weights', 'weights_directory']
+__all__ = ['DIRECTORY_VARIABLE', 'find_file', 'fitting_arrays', 'load_backbone', 'locate',
+           'read_fitting', 'weights_directory']
 
 DIRECTORY_VARIABLE = 'LMSCO_WEIGHTS_DIR'
-
-
-@dataclass(frozen=True)
-class Verification:
-    """
-    What is known of a set of weights that was found to be whole.
-
-    Attributes
-    ----------
-    path : Path
-        The file.
-    numbers : int
-        Number of weights.
-    source_sha256 : str or None
-        Checksum of the file that was imported, or of this one where it is as published; None
-        where that is not told.
-
-    """
-
-    path: Path
-    numbers: int
-    source_sha256: str | None
 
 
 def weights_directory(override: Path | None = None) -> Path:
@@ -69,9 +44,19 @@ def weights_directory(override: Path | None = None) -> Path:
         The folder; without it the environment variable `DIRECTORY_VARIABLE` names it, and
         without that it is the user's cache.
 
+    Raises
+    ------
+    MissingExtraError
+        When nothing names the folder and the extra `weights`, which knows caches, is missing.
+
     """
     chosen = override or os.environ.get(DIRECTORY_VARIABLE)
-    return Path(chosen) if chosen else platformdirs.user_cache_path('lmsco_ros') / 'weights'
+    if chosen:
+        return Path(chosen)
+    require_extra('weights', f'a folder of weights that no {DIRECTORY_VARIABLE} names')
+    import platformdirs
+
+    return platformdirs.user_cache_path('lmsco_ros') / 'weights'
 
 
 def load_backbone(name: str, directory: Path | None = None) -> Backbone:
@@ -93,7 +78,7 @@ def load_backbone(name: str, directory: Path | None = None) -> Backbone:
     """
     source = find_source(name)
     path = find_file(source, directory)
-    return source.architecture.from_arrays(_read_fitting(source, path))
+    return source.architecture.from_arrays(read_fitting(source, path))
 
 
 def locate(source: WeightsSource, directory: Path | None = None) -> Path | None:
@@ -137,103 +122,6 @@ def find_file(source: WeightsSource, directory: Path | None = None) -> Path:
                        f'run {way}; the presets default and hcs need none')
 
 
-def import_weights(file: Path, name: str, directory: Path | None = None) -> Path:
-    """
-    Convert a file of any known format to the one that loads fast, and return where it is.
-
-    Parameters
-    ----------
-    file : Path
-        A published file, see `READERS` for the formats.
-    name : str
-        The weights that it holds, of the registry.
-    directory : Path, optional
-        See `weights_directory`.
-
-    Raises
-    ------
-    WeightsError
-        When the name is unknown or of bundled weights, or the file is damaged, holds another
-        network, or bears the name of the published file but not its checksum.
-
-    """
-    source = _foreign_source(name)
-    found = file_sha256(file)
-    if file.name == source.file_name and source.sha256 not in (None, found):
-        raise WeightsError(f'{file} has the SHA-256 checksum {found}, expected {source.sha256}; '
-                           'it is damaged or was changed: get it again')
-    arrays = _read_fitting(source, file)
-    path = weights_directory(directory) / f'{source.name}.safetensors'
-    write_arrays(path, arrays, {'weights': source.name, 'source_file': file.name,
-                                'source_sha256': found})
-    return path
-
-
-def fetch_weights(name: str, directory: Path | None = None,
-                  progress: Progress = lambda done, total: None) -> Path:
-    """
-    Download the published file of a set of weights, convert it, and return where it is.
-
-    Parameters
-    ----------
-    name, directory
-        As for `import_weights`.
-    progress : callable
-        As for `download`.
-
-    Raises
-    ------
-    WeightsError
-        When the weights have no address, or as for `download` and `import_weights`.
-
-    """
-    source = _foreign_source(name)
-    if source.url is None:
-        where = f'look at {source.page}, then' if source.page else 'get the file, then'
-        raise WeightsError(f'the weights {name} have no address to download from; {where} run '
-                           f'`lmsco weights import FILE --as {name}`')
-    file = weights_directory(directory) / source.file_name
-    try:
-        download(source.url, file, source.sha256, progress)
-    except WeightsError as error:
-        raise WeightsError(f'{error}; or get the file by other means and run '
-                           f'`lmsco weights import FILE --as {name}`') from error
-    try:
-        return import_weights(file, name, directory)
-    finally:
-        file.unlink()
-
-
-def _foreign_source(name: str) -> WeightsSource:
-    """Return the source of weights that a user has to get."""
-    source = find_source(name)
-    if source.bundled:
-        raise WeightsError(f'the weights {name} come with the package; there is nothing to get')
-    return source
-
-
-def verify_weights(name: str, directory: Path | None = None) -> Verification:
-    """
-    Return what is known of a set of weights, read and checked in full.
-
-    Raises
-    ------
-    WeightsError
-        When they are missing or damaged, hold another network, or were made from a file with
-        another checksum than the published one.
-
-    """
-    source = find_source(name)
-    path = find_file(source, directory)
-    arrays = _read_fitting(source, path)
-    found = (file_sha256(path) if path.name == source.file_name
-             else read_about(path).get('source_sha256'))
-    if None not in (found, source.sha256) and found != source.sha256:
-        raise WeightsError(f'{path} comes from a file with the SHA-256 checksum {found}, '
-                           f'expected {source.sha256}; get the published file and import it')
-    return Verification(path, sum(array.size for array in arrays.values()), found)
-
-
 def fitting_arrays(source: WeightsSource, arrays: Mapping[str, np.ndarray],
                    path: Path) -> dict[str, np.ndarray]:
     """
@@ -263,8 +151,23 @@ def fitting_arrays(source: WeightsSource, arrays: Mapping[str, np.ndarray],
     return fitting
 
 
-def _read_fitting(source: WeightsSource, path: Path) -> dict[str, np.ndarray]:
-    """Return the arrays of a network; what the file declares is checked before it is read."""
+def read_fitting(source: WeightsSource, path: Path) -> dict[str, np.ndarray]:
+    """
+    Return what the network needs of a file; what it declares is checked before it is read.
+
+    Parameters
+    ----------
+    source : WeightsSource
+        The weights that the file should hold.
+    path : Path
+        A file of a format of `READERS`.
+
+    Raises
+    ------
+    WeightsError
+        As for `read_arrays` and `fitting_arrays`.
+
+    """
     declared = declared_arrays(path)
     if declared is not None:
         _matching(source, declared, path)

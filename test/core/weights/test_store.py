@@ -26,11 +26,10 @@ from lmsco_ros.core.networks.squeezenet import SqueezeNet
 from lmsco_ros.core.networks.thermal import ThermalNet
 from lmsco_ros.core.networks.vgg_m import VGGM
 from lmsco_ros.core.weights import registry, store
-from lmsco_ros.core.weights.download import file_sha256
+from lmsco_ros.core.weights.acquisition import fetch_weights, import_weights, verify_weights
+from lmsco_ros.core.weights.checksum import file_sha256
 from lmsco_ros.core.weights.formats import read_arrays, write_arrays
-from lmsco_ros.core.weights.store import (
-    DIRECTORY_VARIABLE, fetch_weights, import_weights, load_backbone, verify_weights,
-    weights_directory)
+from lmsco_ros.core.weights.store import DIRECTORY_VARIABLE, load_backbone, weights_directory
 
 SQUEEZENET = 'squeezenet_v1.0'
 FOREIGN_FIRES = (('squeeze', 'squeeze1x1'), ('expand1', 'expand1x1'), ('expand3', 'expand3x3'))
