@@ -145,7 +145,7 @@ def _options() -> argparse.Namespace:
                         help='folder of a dataset, as for lmsco evaluate')
     parser.add_argument('--output', type=Path, required=True)
     parser.add_argument('--sequences', default='*', help='pattern of names, such as "drone_ir/*"')
-    parser.add_argument('--split', help='only this part of the fixed split of thermal_dev')
+    parser.add_argument('--split', type=Path, help='only the test part of the split in this file')
     parser.add_argument('--frames', type=int, default=18_000)
     parser.add_argument('--preset', default='default')
     parser.add_argument('--threads', type=int, default=0)
@@ -156,7 +156,7 @@ def _options() -> argparse.Namespace:
 
 
 def _make(options: argparse.Namespace, bag: Path, truth: Path) -> None:
-    selection = select_sequences(Request(options.data, options.sequences, part=options.split))
+    selection = select_sequences(Request(options.data, options.sequences, split=options.split))
     parts = join(selection.sequences, options.frames, SIZE)
     write_bag(parts, bag)
     write_truth(parts, truth)

@@ -19,8 +19,8 @@ Both track through sequences of a data set, as they are and under challenges, ea
 its own. Boxes and states have to be the same; of the scores the largest difference is told. In the
 folder of the repository:
 git worktree add --detach output/before COMMIT
-python -m benchmarks.same_answers DATA --before output/before [--preset NAME] [--part test]
-    [--challenge NAME ...] [--challenged PATTERN] [--frames N]
+python -m benchmarks.same_answers DATA --before output/before [--preset NAME] [--split FILE]
+    [--part test] [--challenge NAME ...] [--challenged PATTERN] [--frames N]
 """
 
 from __future__ import annotations
@@ -164,12 +164,14 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument('--before', type=Path, required=True, help='folder of a checkout')
     parser.add_argument('--after', type=Path, default=Path(__file__).parents[1])
     parser.add_argument('--preset', default='default')
+    parser.add_argument('--split', type=Path, default=Path(__file__).with_name('thermal_dev.yaml'))
     parser.add_argument('--part', default='test', help='part of the split')
     parser.add_argument('--challenge', action='append', default=[], help='may be repeated')
     parser.add_argument('--challenged', default='*', help='sequences that are challenged')
     parser.add_argument('--frames', type=positive, help='of each sequence, at most')
     options = parser.parse_args(arguments)
-    sequences = load_split().select(options.part, scan_dataset(options.data).sequences)
+    sequences = load_split(options.split).select(
+        options.part, scan_dataset(options.data).sequences)
     rows = run(challenged(sequences, options.challenged, options.challenge),
                (options.before, options.after), options.preset, options.frames)
     different = [row for row in rows if row.boxes or row.states]

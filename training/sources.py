@@ -35,7 +35,10 @@ from lmsco_ros.evaluation.datasets import scan_dataset
 from lmsco_ros.evaluation.geometry import is_absent
 from lmsco_ros.evaluation.split import load_split
 
-__all__ = ['Clip', 'Still', 'data_folder', 'load_clips', 'load_stills']
+__all__ = ['Clip', 'SPLIT', 'Still', 'data_folder', 'load_clips', 'load_stills']
+
+SPLIT = Path(__file__).parents[1] / 'benchmarks' / 'thermal_dev.yaml'
+"""The project's split of `thermal_dev`."""
 
 _SMALLEST_SIDE = 6.0
 _NATURAL_SIDES = (16.0, 90.0)
@@ -138,7 +141,7 @@ def load_clips(dataset: Path, part: str, stride: int = 1) -> list[Clip]:
         Every how many frames are kept.
 
     """
-    sequences = load_split().select(part, scan_dataset(dataset).sequences)
+    sequences = load_split(SPLIT).select(part, scan_dataset(dataset).sequences)
     clips = []
     for sequence in sequences:
         frames = np.stack([to_gray(sequence.frames[i]) for i in range(len(sequence))

@@ -47,7 +47,7 @@ from lmsco_ros.evaluation.errors import EvaluationError, SequenceError
 from lmsco_ros.evaluation.geometry import is_absent
 from lmsco_ros.evaluation.protocols.confidence import auroc, auroc_terms
 from lmsco_ros.evaluation.split import load_split
-from training.sources import data_folder
+from training.sources import data_folder, SPLIT
 from training.train import CONFIG
 
 CHALLENGES = ('', 'disappear_1s', 'disappear_3s', 'leave', 'cut', 'twin', 'twin_remains',
@@ -126,7 +126,7 @@ def validation_clips(dataset: Path, frames: int) -> list[TrackingSequence]:
 
     """
     every = yaml.safe_load(CONFIG.read_text(encoding='utf-8'))['validation']['every']
-    known = load_split().select('train', scan_dataset(dataset).sequences)
+    known = load_split(SPLIT).select('train', scan_dataset(dataset).sequences)
     return [clip.first(min(frames, len(clip))) for clip in known[::every]]
 
 

@@ -40,11 +40,9 @@ class Protocol(str, Enum):
     VOT = 'vot'
 
 
-class Part(str, Enum):
-    """Part of the fixed split."""
-
-    TEST = 'test'
-    TRAIN = 'train'
+SplitOption = Annotated[Optional[Path], typer.Option(
+    exists=True, dir_okay=False, show_default=False,
+    help='YAML file of a split of the dataset: names of sequences by part and group.')]
 
 
 def register(app: typer.Typer) -> None:
@@ -74,8 +72,8 @@ def evaluate(
         min=2, show_default=False, help='Only the first N frames of each sequence.')] = None,
     jobs: Annotated[int, typer.Option(
         min=1, help='Number of single-threaded processes.')] = 1,
-    split: Annotated[Optional[Part], typer.Option(
-        show_default=False, help='Only this part of the fixed split of thermal_dev.')] = None,
+    split: SplitOption = None,
+    part: Annotated[str, typer.Option(help='Part of the split that is evaluated.')] = 'test',
     challenge: Annotated[Optional[list[str]], typer.Option(
         show_default='the sequences as they are',
         help='Make the sequences harder: disappear_1s, disappear_3s, leave, cut, twin, '
@@ -91,7 +89,7 @@ def evaluate(
 
     with plain_errors():
         with _misuse():
-            request = Request(dataset, sequences, frames, split.value if split else None,
+            request = Request(dataset, sequences, frames, split, part,
                               challenge_names(challenge or []))
             trackers, unavailable = (
                 (build_trackers(tracker), ()) if tracker else buildable_trackers())
@@ -117,13 +115,17 @@ def results(
         show_default=False, help='Output folders of `lmsco evaluate`, on the same sequences.')],
     page: Annotated[Path, typer.Option(
         dir_okay=False, help='Markdown file to write.')] = Path('docs/results.md'),
+    split: SplitOption = None,
 ) -> None:
     """Write the tables of evaluations as one Markdown page."""
     from lmsco_ros.evaluation.results_page import results_page
+    from lmsco_ros.evaluation.split import load_split
     from lmsco_ros.evaluation.whole_file import write_whole
 
     with plain_errors():
-        write_whole(page, results_page(folders).encode())
+        with _misuse():
+            known = load_split(split) if split else None
+        write_whole(page, results_page(folders, known).encode())
         say(f'results: {page}')
 
 

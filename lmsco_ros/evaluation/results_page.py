@@ -28,7 +28,7 @@ from lmsco_ros.evaluation.report.tables import (
     absence_table, Cell, confidence_table, difference_rows, DifferenceRow, one_pass_table,
     supervised_table, Table)
 from lmsco_ros.evaluation.run_file import EvaluationRun, read_run
-from lmsco_ros.evaluation.split import load_split
+from lmsco_ros.evaluation.split import Split
 from lmsco_ros.evaluation.summaries.confidence import summarize_confidence
 from lmsco_ros.evaluation.summaries.differences import differences
 from lmsco_ros.evaluation.summaries.one_pass import summarize_one_pass
@@ -41,12 +41,7 @@ Written by `lmsco results`; do not change by hand.
 
 Brackets hold 95 % bootstrap intervals over sequences; bold is the best of a column.
 
-**What this is not.** These are a few thermal sequences, not a benchmark: the published
-averages of VOT-TIR, PTB-TIR and LSOTB-TIR need the full benchmarks, which cannot be
-passed on and which `lmsco evaluate` reads where you have them. EAO here is taken over
-these sequences and compares within this page only. `drone_ir` is a subsample of the
-clips of its source, and the forty in the test part were picked as hard ones by the
-criteria of `lmsco_ros/evaluation/split_selection.py`, not at random.
+EAO is taken over these sequences and compares within this page only.
 """
 
 _ONE_PASS_NOTE = """\
@@ -82,7 +77,7 @@ and the state is not LOST. Boxes without any overlap before that are claims else
 """
 
 
-def results_page(folders: Sequence[Path]) -> str:
+def results_page(folders: Sequence[Path], split: Split | None = None) -> str:
     """
     Return the tables of evaluation folders as Markdown.
 
@@ -90,6 +85,8 @@ def results_page(folders: Sequence[Path]) -> str:
     ----------
     folders : sequence of Path
         Outputs of `lmsco evaluate`; trackers of several folders come into one table.
+    split : Split, optional
+        Tells of the dataset, and which groups have chapters of their own.
 
     Raises
     ------
@@ -102,8 +99,9 @@ def results_page(folders: Sequence[Path]) -> str:
     if not runs:
         raise DatasetError(f'no results in {", ".join(map(str, folders))}; '
                            'give output folders of `lmsco evaluate`')
-    parts = [_INTRODUCTION]
-    for title, groups, challenge in _scenes(next(iter(runs.values()))):
+    scenes = split.scenes if split else {}
+    parts = [_INTRODUCTION, *([split.about] if split and split.about else [])]
+    for title, groups, challenge in _scenes(next(iter(runs.values())), scenes):
         parts += _scene(title, {name: run.only(groups, challenge)
                                 for name, run in runs.items()})
     parts += ['## Conditions\n', _conditions(runs)]
@@ -132,7 +130,8 @@ def _names(run: EvaluationRun) -> list[tuple[str, int]]:
     return [(sequence.full_name, len(sequence.ground_truth)) for sequence in run.sequences]
 
 
-def _scenes(run: EvaluationRun) -> list[tuple[str, Optional[tuple[str, ...]], Optional[str]]]:
+def _scenes(run: EvaluationRun, scenes: Mapping[str, tuple[str, ...]],
+            ) -> list[tuple[str, tuple[str, ...] | None, str | None]]:
     """
     Return what has a chapter of its own: title, groups and challenge, None for any.
 
@@ -145,7 +144,7 @@ def _scenes(run: EvaluationRun) -> list[tuple[str, Optional[tuple[str, ...]], Op
     present = {sequence.group for sequence in run.sequences}
     found: list[tuple[str, Optional[tuple[str, ...]], Optional[str]]] = [
         (f'{scene.capitalize()} ({", ".join(groups)})', groups, None)
-        for scene, groups in load_split().scenes.items() if present & set(groups)]
+        for scene, groups in scenes.items() if present & set(groups)]
     return found + [('All sequences', None, None)] if len(found) != 1 else found
 
 

@@ -48,8 +48,10 @@ class Request:
         Shell pattern for `name` or `group/name`.
     frames : int or None
         Only the first so many frames of each sequence.
-    part : str or None
-        Only this part of the fixed split.
+    split : Path or None
+        File of a split, of which only one part is evaluated.
+    part : str
+        That part.
     challenges : tuple of str
         Each sequence once with each of these challenges; empty: as it was recorded.
 
@@ -58,7 +60,8 @@ class Request:
     dataset: Path
     pattern: str = '*'
     frames: Optional[int] = None
-    part: Optional[str] = None
+    split: Path | None = None
+    part: str = 'test'
     challenges: tuple[str, ...] = ()
 
 
@@ -77,7 +80,7 @@ def select_sequences(request: Request) -> Selection:
     Raises
     ------
     RequestError
-        When there is no such dataset, pattern or part of the split.
+        When there is no such dataset, pattern, split or part of it.
     DatasetError
         When none is left that can be used.
 
@@ -88,8 +91,8 @@ def select_sequences(request: Request) -> Selection:
     if not chosen and not broken:
         raise RequestError(_unmatched(request, [
             *(item.full_name for item in scan.sequences), *(item.name for item in scan.broken)]))
-    if request.part is not None:
-        split = load_split()
+    if request.split is not None:
+        split = load_split(request.split)
         chosen = split.select(request.part, chosen)
         broken = [item for item in broken if item.name in split.parts[request.part]]
     if not chosen:
@@ -155,7 +158,8 @@ def describe(request: Request, jobs: int, skipped: Sequence[BrokenSequence]) -> 
     """Return the conditions of a run for its run file; no paths, no host."""
     return {
         'dataset': request.dataset.resolve().name, 'sequences': request.pattern,
-        'frames': request.frames, 'split': request.part,
+        'frames': request.frames,
+        **({'split': request.split.name, 'part': request.part} if request.split else {}),
         'challenges': list(request.challenges), 'jobs': jobs,
         'date': date.today().isoformat(), 'machine': machine(), 'versions': dict(versions()),
         'skipped': [{'name': item.name, 'reason': item.reason} for item in skipped],

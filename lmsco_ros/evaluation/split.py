@@ -12,20 +12,18 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""A fixed split of a dataset: which sequences are for training, which for tables."""
+"""A split of a dataset: which sequences are for training, which for tables."""
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from importlib import resources
-from typing import Iterable, Mapping
+from pathlib import Path
 
 import yaml
 
 from lmsco_ros.evaluation.datasets import TrackingSequence
 from lmsco_ros.evaluation.errors import RequestError
-
-_PACKAGE = 'lmsco_ros.evaluation.splits'
 
 
 @dataclass(frozen=True)
@@ -36,17 +34,20 @@ class Split:
     Attributes
     ----------
     name : str
-        Name of the dataset.
+        Of the file.
     parts : mapping of str to frozenset of str
-        'test' and 'train' to names `group/sequence`.
+        Part, such as 'test', to names `group/sequence`.
     scenes : mapping of str to tuple of str
         Kind of scene, such as 'ground-level', to groups.
+    about : str
+        What readers of the results have to know of the dataset, as Markdown.
 
     """
 
     name: str
     parts: Mapping[str, frozenset[str]]
     scenes: Mapping[str, tuple[str, ...]]
+    about: str = ''
 
     def select(self, part: str, sequences: Iterable[TrackingSequence]) -> list[TrackingSequence]:
         """
@@ -68,12 +69,40 @@ class Split:
         return found
 
 
-def load_split(name: str = 'thermal_dev') -> Split:
-    """Return the split that the package holds under `name`."""
-    text = resources.files(_PACKAGE).joinpath(f'{name}.yaml').read_text(encoding='utf-8')
-    content = yaml.safe_load(text)
-    parts = {part: frozenset(f'{group}/{sequence}' for group, members in groups.items()
-                             for sequence in members)
-             for part, groups in content['parts'].items()}
-    scenes = {scene: tuple(groups) for scene, groups in content['scenes'].items()}
-    return Split(name, parts, scenes)
+def load_split(path: Path) -> Split:
+    """
+    Return the split that a YAML file describes.
+
+    Parameters
+    ----------
+    path : Path
+        A mapping: `parts` from the name of a part to groups to names of sequences; `scenes`, which
+        may be left out, from a kind of scene to groups; `about`, as well, a text.
+
+    Raises
+    ------
+    OSError
+        When the file cannot be read.
+    RequestError
+        When it is no split; names the file and what is wrong.
+
+    """
+    try:
+        content = yaml.safe_load(path.read_bytes())
+        parts = {str(part): frozenset(f'{group}/{name}' for group, names in groups.items()
+                                      for name in _listed(names))
+                 for part, groups in content['parts'].items()}
+        scenes = {str(scene): tuple(map(str, _listed(groups)))
+                  for scene, groups in content.get('scenes', {}).items()}
+        return Split(path.name, parts, scenes, str(content.get('about', '')))
+    except (yaml.YAMLError, AttributeError, KeyError, TypeError) as error:
+        reason = ' '.join(str(error).split())
+        raise RequestError(f'{path} is no split ({reason}); expected YAML such as '
+                           '{parts: {test: {GROUP: [SEQUENCE, ...]}}}') from error
+
+
+def _listed(names: object) -> list[object]:
+    """Return names that are a list."""
+    if not isinstance(names, list):
+        raise TypeError(f'{names!r} is no list of names')
+    return names

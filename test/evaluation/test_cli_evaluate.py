@@ -140,7 +140,7 @@ MISTAKES = [
     (('--tracker', 'vit:{folder}/data/vot_tir/rough/groundtruth.txt'), 'cannot use the model'),
     (('--sequences', 'stedy'), "matches 'stedy'; near are steady; a pattern is"),
     (('--sequences', '*/nothing'), 'there are vot_tir/rough, vot_tir/steady, vot_tir/torn; a'),
-    (('--split', 'test'), 'no sequence of this dataset'),
+    (('--split', 'benchmarks/thermal_dev.yaml'), 'no sequence of this dataset'),
     (('--challenge', 'fog'), "there is no challenge 'fog'; known are"),
 ]
 

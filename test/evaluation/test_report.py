@@ -28,6 +28,7 @@ from lmsco_ros.evaluation.report.page import write_report
 from lmsco_ros.evaluation.report.pictures import encode, failure_strip, thumbnail
 from lmsco_ros.evaluation.results_page import results_page
 from lmsco_ros.evaluation.run_file import EvaluationRun, read_run, SequenceInfo, write_run
+from lmsco_ros.evaluation.split import Split
 from lmsco_ros.evaluation.trace import Trace
 
 VOID = {'meta', 'img', 'rect', 'line', 'br', 'link'}
@@ -86,7 +87,7 @@ def runs(sequences):
     """Return a run under each protocol."""
     infos = tuple(SequenceInfo(item.name, item.group, (64, 48), item.ground_truth,
                                item.attributes) for item in sequences)
-    context = {'dataset': 'thermal', 'split': 'test', 'jobs': 2, 'date': '2026-01-01',
+    context = {'dataset': 'thermal', 'split': 'thermal.yaml', 'part': 'test', 'jobs': 2, 'date': '2026-01-01',
                'machine': {'processor': 'Abacus 3000', 'cores': '2'},
                'versions': {'numpy': '9.9'},
                'skipped': [{'name': 'x/broken', 'reason': 'no frames'}]}
@@ -152,8 +153,8 @@ def test_pictures_mark_truth_and_answer(sequences):
 
 def test_command_can_be_repeated(runs):
     assert command_line(runs['vot']) == (
-        'lmsco evaluate thermal --protocol vot --split test --tracker hcs --tracker csrt '
-        '--tracker lazy --jobs 2 --output results')
+        'lmsco evaluate thermal --protocol vot --split thermal.yaml --part test --tracker hcs '
+        '--tracker csrt --tracker lazy --jobs 2 --output results')
 
 
 def test_results_page_has_a_table_for_each_kind_of_scene(tmp_path, runs):
@@ -165,11 +166,16 @@ def test_results_page_has_a_table_for_each_kind_of_scene(tmp_path, runs):
         write_run(tmp_path, protocol, run.sequences,
                   {name: [f'{protocol}-{name}-{info.group}.json' for info in run.sequences]
                    for name in TRACKERS}, run.context)
-    text = results_page([tmp_path])
+    split = Split('thermal', {}, {'ground-level': ('vot_tir', 'ptb_tir'),
+                                  'aerial': ('anti_uav_ir', 'drone_ir')}, 'Few sequences.\n')
+    text = results_page([tmp_path], split)
     titles = [line for line in text.splitlines() if line.startswith('## ')]
     assert titles == ['## Ground-level (vot_tir, ptb_tir)', '## Aerial (anti_uav_ir, drone_ir)',
                       '## All sequences', '## Conditions']
-    assert 'What this is not' in text and 'need the full benchmarks' in text
+    assert '\nFew sequences.\n' in text
+    plain = results_page([tmp_path])
+    assert [line for line in plain.splitlines() if line.startswith('## ')] == [
+        '## All sequences', '## Conditions']
     assert '| csrt | ' in text and 'Abacus 3000' in text
     assert str(tmp_path) not in text
     again = read_run(tmp_path, 'vot')

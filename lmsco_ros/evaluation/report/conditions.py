@@ -27,7 +27,7 @@ def command_line(run: EvaluationRun) -> str:
     context = run.context
     words = ['lmsco', 'evaluate', str(context.get('dataset', 'DATASET')),
              '--protocol', run.protocol]
-    for option in ('split', 'frames'):
+    for option in ('split', 'part', 'frames'):
         if context.get(option):
             words += [f'--{option}', str(context[option])]
     if context.get('sequences', '*') != '*':

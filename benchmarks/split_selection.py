@@ -15,7 +15,7 @@
 """
 Choose the test clips of a group by what makes tracking hard, and write the split.
 
-    python -m lmsco_ros.evaluation.split_selection THERMAL_DEV > splits/thermal_dev.yaml
+    python -m benchmarks.split_selection THERMAL_DEV > benchmarks/thermal_dev.yaml
 
 Three criteria are measured from ground truth and images: motion, size change and
 clutter. The clips are ranked by each; the hardest of each ranking are taken in turn
@@ -25,11 +25,12 @@ since their ground truth follows the first one only.
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 import csv
 from dataclasses import dataclass
 from itertools import chain
 from pathlib import Path
-from typing import Callable, Iterable, Iterator, Mapping, Sequence
+from textwrap import indent
 
 import numpy as np
 import numpy.typing as npt
@@ -44,6 +45,13 @@ CHOSEN_GROUP = 'drone_ir'
 CHOSEN_COUNT = 40
 SCENES = {'ground-level': ['vot_tir', 'ptb_tir'], 'aerial': ['anti_uav_ir', 'drone_ir']}
 _SAMPLED_IMAGES = 12
+ABOUT = """\
+**What this is not.** These are a few thermal sequences, not a benchmark: the published
+averages of VOT-TIR, PTB-TIR and LSOTB-TIR need the full benchmarks, which cannot be
+passed on and which `lmsco evaluate` reads where you have them. `drone_ir` is a
+subsample of the clips of its source, and the forty in the test part were picked as hard
+ones by the criteria of `benchmarks/split_selection.py`, not at random.
+"""
 
 
 @dataclass(frozen=True)
@@ -145,8 +153,9 @@ def main(dataset: Path) -> None:
     with summary.open(encoding='utf-8') as stream:
         several = frozenset(_several_targets(csv.DictReader(stream)))
     content = split_content(scan_dataset(dataset).sequences, several)
-    print('# Written by: python -m lmsco_ros.evaluation.split_selection THERMAL_DEV\n'
+    print('# Written by: python -m benchmarks.split_selection THERMAL_DEV\n'
           '# The criteria are documented there. Names only; do not change by hand.')
+    print('about: |\n' + indent(ABOUT, '  '), end='')
     print(yaml.safe_dump(content, sort_keys=False), end='')
 
 
