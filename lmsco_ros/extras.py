@@ -21,6 +21,7 @@ The tracker and the node need none of them. What does calls `require_extra` befo
 from __future__ import annotations
 
 from importlib.util import find_spec
+import sys
 
 __all__ = ['MissingExtraError', 'MODULES', 'require_extra']
 
@@ -37,7 +38,7 @@ class MissingExtraError(ImportError):
     """Something was asked for that needs an extra which is not installed; names the remedy."""
 
 
-def require_extra(extra: str, purpose: str) -> None:
+def require_extra(extra: str, purpose: str, *modules: str) -> None:
     """
     Tell of an extra that is missing, in one line.
 
@@ -47,14 +48,16 @@ def require_extra(extra: str, purpose: str) -> None:
         One of `MODULES`.
     purpose : str
         What it is needed for: the beginning of the message.
+    *modules : str
+        Those of its modules that are needed; without any, all.
 
     Raises
     ------
     MissingExtraError
-        When a module of the extra is not installed.
+        When one of the modules is not installed.
 
     """
-    missing = [name for name in MODULES[extra] if not _is_installed(name)]
+    missing = [name for name in modules or MODULES[extra] if not _is_installed(name)]
     if missing:
         raise MissingExtraError(
             f'{purpose} needs the extra `{extra}`, of which {", ".join(missing)} is not '
@@ -63,6 +66,8 @@ def require_extra(extra: str, purpose: str) -> None:
 
 def _is_installed(name: str) -> bool:
     """Tell whether a module is there, without importing more than the package it lies in."""
+    if sys.modules.get(name) is not None:
+        return True
     try:
         return find_spec(name) is not None
     except ModuleNotFoundError:

@@ -46,6 +46,7 @@ def plain_errors() -> Iterator[None]:
     """
     from lmsco_ros.core.errors import ConfigError, LMSCOError
     from lmsco_ros.evaluation.errors import EvaluationError
+    from lmsco_ros.extras import MissingExtraError
     from lmsco_ros.replay.errors import ReplayError
 
     try:
@@ -55,7 +56,7 @@ def plain_errors() -> Iterator[None]:
         fail(str(error), MISUSED)
     except OSError as error:
         fail(_words(error), FAILED)
-    except (LMSCOError, EvaluationError, ReplayError) as error:
+    except (LMSCOError, EvaluationError, MissingExtraError, ReplayError) as error:
         fail(str(error), FAILED)
 
 

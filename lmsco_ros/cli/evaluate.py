@@ -26,6 +26,7 @@ import typer
 
 from lmsco_ros.cli.console import (
     fail, frame_progress, MISUSED, plain_errors, say, telling_what_is_kept, warn)
+from lmsco_ros.extras import require_extra
 
 if TYPE_CHECKING:
     from lmsco_ros.evaluation.runner import Evaluation
@@ -81,6 +82,8 @@ def evaluate(
              'sixteen_bit or all. May be repeated.')] = None,
 ) -> None:
     """Run trackers over a dataset and report accuracy, robustness and speed."""
+    with plain_errors():
+        require_extra('eval', '`lmsco evaluate`')
     from lmsco_ros.evaluation.challenges import challenge_names
     from lmsco_ros.evaluation.runner import Evaluation
     from lmsco_ros.evaluation.session import (
@@ -118,6 +121,8 @@ def results(
     split: SplitOption = None,
 ) -> None:
     """Write the tables of evaluations as one Markdown page."""
+    with plain_errors():
+        require_extra('eval', '`lmsco results`')
     from lmsco_ros.evaluation.results_page import results_page
     from lmsco_ros.evaluation.split import load_split
     from lmsco_ros.evaluation.whole_file import write_whole

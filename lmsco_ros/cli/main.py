@@ -19,6 +19,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from lmsco_ros.cli.interruption import ended_by_signals
+from lmsco_ros.extras import MissingExtraError, require_extra
 
 if TYPE_CHECKING:
     import typer
@@ -48,9 +49,11 @@ def main() -> None:
     # The imports take long enough to be interrupted.
     with ended_by_signals():
         try:
+            require_extra('cli', 'the command line')
             build_app()(prog_name='lmsco')
-        except OSError as error:
-            # Commands tell theirs; this is a help that found no room on standard output.
+        except (MissingExtraError, OSError) as error:
+            # Commands tell theirs; this one of OSError is a help that found no room on standard
+            # output.
             raise SystemExit(f'error: {error}') from error
 
 

@@ -22,6 +22,7 @@ from typing import Annotated, Optional
 import typer
 
 from lmsco_ros.cli.console import byte_progress, plain_errors, say, show_table, warn
+from lmsco_ros.extras import require_extra
 
 NameArgument = Annotated[str, typer.Argument(
     show_default=False, help='Name of the weights, see `lmsco weights list`.')]
@@ -72,6 +73,7 @@ def fetch(
         if path and not force:
             say(f'{name} is here: {path}')
             return
+        require_extra('weights', 'a download of weights')
         with byte_progress() as progress:
             task = progress.add_task(name, total=None)
             path = fetch_weights(name, directory, lambda done, total: progress.update(

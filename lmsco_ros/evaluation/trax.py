@@ -40,6 +40,7 @@ import numpy.typing as npt
 
 from lmsco_ros.core import (
     BoundingBox, BoxError, ImageError, LMSCOError, LMSCOTracker, TrackerConfig, TrackResult)
+from lmsco_ros.extras import MissingExtraError, require_extra
 from lmsco_ros.media.false_color import without_false_color
 
 
@@ -216,11 +217,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """
     options = parse(arguments)
     try:
-        import trax
-    except ImportError as error:
-        print(f'TraX is not available ({error}); install it with: '
-              "pip install 'lmsco_ros[vot]'", file=sys.stderr)
+        require_extra('vot', 'the TraX server')
+    except MissingExtraError as error:
+        print(error, file=sys.stderr)
         return 2
+    import trax
+
     handle = trax.Server(
         [trax.Region.RECTANGLE], [trax.Image.PATH, trax.Image.MEMORY, trax.Image.BUFFER],
         [options.channel], 'lmsco', 'Large margin structured convolution operator', 'correlation')

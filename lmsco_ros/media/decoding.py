@@ -25,6 +25,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 import warnings
 
+from lmsco_ros.extras import require_extra
 from lmsco_ros.media.errors import MediaError, MediaWarning
 
 if TYPE_CHECKING:
@@ -46,8 +47,11 @@ def open_film(path: Path) -> Iterator[tuple[InputContainer, VideoStream]]:
     ------
     MediaError
         When it is none.
+    MissingExtraError
+        When PyAV, which reads films, is not installed.
 
     """
+    require_extra('cli', f'{path.name}, a film,', 'av')
     import av
 
     try:

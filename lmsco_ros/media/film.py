@@ -26,6 +26,8 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
+from lmsco_ros.extras import require_extra
+
 if TYPE_CHECKING:
     from av import FFmpegError, VideoStream
     from av.container import OutputContainer
@@ -58,10 +60,13 @@ class FilmWriter:
     ------
     OSError
         When the film cannot be written; names the file.
+    MissingExtraError
+        When PyAV, which writes it, is not installed.
 
     """
 
     def __init__(self, path: Path, fps: float) -> None:
+        require_extra('cli', f'{path.name}, a film,', 'av')
         self._path = path
         self._rate = Fraction(fps).limit_denominator(1001)
         self._open: _OpenFilm | None = None

@@ -13,3 +13,7 @@
 # limitations under the License.
 
 """Recorded images in, tracking results out: folders, videos and bags."""
+
+from lmsco_ros.extras import require_extra
+
+require_extra('cli', 'lmsco_ros.replay', 'matplotlib', 'rosbags')

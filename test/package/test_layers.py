@@ -25,7 +25,8 @@ REPOSITORY = Path(__file__).resolve().parents[2]
 # From the top down; what stands on one line does not know of its neighbors.
 PACKAGES = (
     ('benchmarks',), ('training',), ('cli',), ('replay',), ('evaluation', 'node'),
-    ('visualization', 'msg_adapters'), ('synthetic', 'media'), ('core',))
+    ('visualization', 'msg_adapters'), ('synthetic', 'media'), ('core',),
+    ('extras',))
 CORE = (
     ('tracker',), ('track',), ('search',), ('presence',), ('detection',), ('extent', 'features'),
     ('weights', 'learning'), ('imaging', 'fourier'), ('config', 'networks', 'backend', 'types'),
@@ -69,8 +70,8 @@ def objections(folder: Path, room: str, prefix: str,
 
 @pytest.mark.parametrize('package', levels(PACKAGES))
 def test_packages_know_only_what_is_below_them(package):
-    folder = next(REPOSITORY / place for place in (f'lmsco_ros/{package}', package)
-                  if (REPOSITORY / place).is_dir())
+    folder = next((REPOSITORY / place for place in (f'lmsco_ros/{package}', package)
+                   if (REPOSITORY / place).is_dir()), REPOSITORY / 'lmsco_ros' / package)
     assert not list(objections(folder, package, 'lmsco_ros.', PACKAGES))
 
 

@@ -13,3 +13,7 @@
 # limitations under the License.
 
 """The report: plots, pictures and one self-contained page."""
+
+from lmsco_ros.extras import require_extra
+
+require_extra('eval', 'a report on evaluations', 'jinja2', 'matplotlib')
