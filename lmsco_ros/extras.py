@@ -26,7 +26,7 @@ import sys
 __all__ = ['MissingExtraError', 'MODULES', 'require_extra']
 
 MODULES = {
-    'cli': ('av', 'matplotlib', 'rich', 'rosbags', 'typer'),
+    'cli': ('av', 'backports.zstd', 'lz4', 'matplotlib', 'rich', 'rosbags', 'typer'),
     'eval': ('av', 'jinja2', 'matplotlib'),
     'weights': ('google.protobuf', 'platformdirs', 'requests'),
     'vot': ('trax',),

@@ -132,5 +132,5 @@ def _check_size(message: Image, layout: Layout) -> None:
 def byte_array(values: npt.NDArray) -> array:
     """Return the bytes of an array as the one type that a message takes unchecked."""
     data = array('B')
-    data.frombytes(memoryview(np.ascontiguousarray(values)).cast('B'))
+    data.frombytes(np.ascontiguousarray(values).data.cast('B'))
     return data

@@ -19,7 +19,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from enum import IntEnum
-from typing import NamedTuple
+from typing import NamedTuple, TypeVar
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from std_msgs.msg import Header
@@ -109,8 +109,9 @@ class FrameStatus:
 
 
 # Prefix of the keys in the message, attribute of FrameStatus and its type.
-_GROUPS = (('', 'times', FrameTimes), ('target_', 'target', Reading),
-           ('target_celsius_', 'target_celsius', Reading))
+_Group = TypeVar('_Group', FrameTimes, Reading)
+# What stands before the numbers of a group, and the attribute that holds them.
+_GROUPS = (('', 'times'), ('target_', 'target'), ('target_celsius_', 'target_celsius'))
 
 
 def message_from_diagnoses(diagnoses: Iterable[Diagnosis],
@@ -150,7 +151,7 @@ def message_from_status(status: FrameStatus, name: str,
         'tracker_ms': repr(float(status.tracker_ms)),
         'dropped_frames': str(status.dropped_frames),
     }
-    for prefix, attribute, _ in _GROUPS:
+    for prefix, attribute in _GROUPS:
         group = getattr(status, attribute)
         if group is not None:
             values |= {prefix + key: repr(float(value))
@@ -178,15 +179,15 @@ def status_from_message(message: DiagnosticArray) -> FrameStatus:
             float(values['score']) if values['score'] else None,
             float(values['latency_ms']), float(values['tracker_ms']),
             int(values['dropped_frames']), diagnosis.level, diagnosis.message,
-            **{attribute: _group(values, prefix, kind) for prefix, attribute, kind in _GROUPS})
+            times=_group(values, '', FrameTimes), target=_group(values, 'target_', Reading),
+            target_celsius=_group(values, 'target_celsius_', Reading))
     except (KeyError, ValueError) as error:
         raise StatusMessageError(
             f'the message is no frame status ({error}); expected one entry with state, '
             'track_id, score, latency_ms, tracker_ms and dropped_frames') from error
 
 
-def _group(values: Mapping[str, str], prefix: str,
-           kind: type[FrameTimes] | type[Reading]) -> FrameTimes | Reading | None:
+def _group(values: Mapping[str, str], prefix: str, kind: type[_Group]) -> _Group | None:
     """Return the numbers that belong together; None when they are not there."""
     if prefix + kind._fields[0] not in values:
         return None

@@ -17,13 +17,13 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Optional, TYPE_CHECKING
+from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from lmsco_ros.core import TrackerConfig
 
 
-def load_config(preset: str, path: Optional[Path] = None) -> TrackerConfig:
+def load_config(preset: str, path: Path | None = None) -> TrackerConfig:
     """
     Return the configuration in `path`, or without one the preset.
 
@@ -38,6 +38,6 @@ def load_config(preset: str, path: Optional[Path] = None) -> TrackerConfig:
     return TrackerConfig.from_yaml(path) if path else TrackerConfig.preset(preset)
 
 
-def node_parameters(preset: str, path: Optional[Path] = None) -> dict[str, str]:
+def node_parameters(preset: str, path: Path | None = None) -> dict[str, str]:
     """Return the parameters that tell the node to use the configuration of `load_config`."""
     return {'preset': preset, 'tracker_config': str(path.resolve()) if path else ''}

@@ -20,7 +20,7 @@ from collections.abc import Iterator
 from contextlib import closing, contextmanager
 from enum import Enum
 from pathlib import Path
-from typing import Annotated, Optional, TYPE_CHECKING
+from typing import Annotated, TYPE_CHECKING
 
 import typer
 
@@ -41,7 +41,7 @@ class Protocol(str, Enum):
     VOT = 'vot'
 
 
-SplitOption = Annotated[Optional[Path], typer.Option(
+SplitOption = Annotated[Path | None, typer.Option(
     exists=True, dir_okay=False, show_default=False,
     help='YAML file of a split of the dataset: names of sequences by part and group.')]
 
@@ -60,7 +60,7 @@ def evaluate(
     output: Annotated[Path, typer.Option(
         file_okay=False, show_default=False,
         help='Folder for records, plots and report.html; finished work in it is kept.')],
-    tracker: Annotated[Optional[list[str]], typer.Option(
+    tracker: Annotated[list[str] | None, typer.Option(
         show_default='all that work here',
         help='Preset, config:FILE (YAML), csrt, kcf, mil, mosse, medianflow, '
              'nanotrack:BACKBONE,HEAD, vit:NET, trax:NAME=COMMAND or python:MODULE:CALLABLE. '
@@ -69,13 +69,13 @@ def evaluate(
         help='ope: one pass; vot: start again after each failure.')] = Protocol.OPE,
     sequences: Annotated[str, typer.Option(
         help='Pattern of names, such as "vot_tir/*" or "bird*".')] = '*',
-    frames: Annotated[Optional[int], typer.Option(
+    frames: Annotated[int | None, typer.Option(
         min=2, show_default=False, help='Only the first N frames of each sequence.')] = None,
     jobs: Annotated[int, typer.Option(
         min=1, help='Number of single-threaded processes.')] = 1,
     split: SplitOption = None,
     part: Annotated[str, typer.Option(help='Part of the split that is evaluated.')] = 'test',
-    challenge: Annotated[Optional[list[str]], typer.Option(
+    challenge: Annotated[list[str] | None, typer.Option(
         show_default='the sequences as they are',
         help='Make the sequences harder: disappear_1s, disappear_3s, leave, cut, twin, '
              'twin_remains, shutter, gain_jump, polarity, dead_pixels, telemetry, nan, text, '

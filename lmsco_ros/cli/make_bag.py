@@ -19,7 +19,7 @@ from __future__ import annotations
 from itertools import islice
 from pathlib import Path
 import time
-from typing import Annotated, Optional, TYPE_CHECKING
+from typing import Annotated, TYPE_CHECKING
 
 import typer
 
@@ -43,7 +43,7 @@ def make_bag(
     output: Annotated[Path, typer.Option(
         show_default=False, help='Folder of the new bag; it must not exist.')],
     storage: Annotated[Storage, typer.Option(help='File format.')] = Storage.MCAP,
-    fps: Annotated[Optional[float], typer.Option(
+    fps: Annotated[float | None, typer.Option(
         min=0.1, max=1000, show_default="the video's own, or 30",
         help='Frames per second.')] = None,
     topic: Annotated[str, typer.Option(help='Topic of the images.')] = 'image_raw',

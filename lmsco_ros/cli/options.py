@@ -18,7 +18,7 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
-from typing import Annotated, NamedTuple, Optional
+from typing import Annotated, NamedTuple
 
 import typer
 
@@ -59,8 +59,8 @@ TopicOption = Annotated[str, typer.Option(
     '--topic', show_default=False,
     help='Image topic of the bag; needed only when it has several.')]
 PresetOption = Annotated[str, typer.Option('--preset', help='Named tracker configuration.')]
-ConfigOption = Annotated[Optional[Path], typer.Option(
+ConfigOption = Annotated[Path | None, typer.Option(
     '--config', exists=True, dir_okay=False, show_default=False,
     help='YAML file with a tracker configuration, in place of the preset.')]
-FramesOption = Annotated[Optional[int], typer.Option(
+FramesOption = Annotated[int | None, typer.Option(
     '--frames', min=1, show_default=False, help='Only the first N frames.')]

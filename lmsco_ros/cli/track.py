@@ -20,7 +20,7 @@ from collections.abc import Iterator
 from itertools import islice
 from pathlib import Path
 import time
-from typing import Annotated, Optional, TYPE_CHECKING
+from typing import Annotated, TYPE_CHECKING
 
 import typer
 
@@ -45,18 +45,18 @@ def register(app: typer.Typer) -> None:
 
 def track(
     source: SourceArgument,
-    init: Annotated[Optional[Box], typer.Option(
+    init: Annotated[Box | None, typer.Option(
         parser=parse_box, metavar='x,y,w,h', show_default=False,
         help='Target in the first frame: top-left corner, width and height in pixels. '
              'May be left out when there is a ground truth.')] = None,
     topic: TopicOption = '',
     preset: PresetOption = 'default',
     config: ConfigOption = None,
-    output: Annotated[Optional[Path], typer.Option(
+    output: Annotated[Path | None, typer.Option(
         file_okay=False, show_default='output/<source>',
         help='Folder for boxes.csv, overlay.mp4 and summary.png.')] = None,
     frames: FramesOption = None,
-    ground_truth: Annotated[Optional[Path], typer.Option(
+    ground_truth: Annotated[Path | None, typer.Option(
         exists=True, dir_okay=False, show_default=False,
         help='One row a frame, x,y,w,h or polygon corners: shown, and compared with.')] = None,
 ) -> None:
@@ -82,7 +82,7 @@ def track(
         say_where(outputs)
 
 
-def _read_truth(path: Optional[Path], frames: int) -> list[Optional[BoundingBox]]:
+def _read_truth(path: Path | None, frames: int) -> list[BoundingBox | None]:
     """Return the true boxes, None where the target is absent; empty without a file."""
     from lmsco_ros.core import BoundingBox
     from lmsco_ros.evaluation.datasets.boxes_text import read_boxes
@@ -97,7 +97,7 @@ def _read_truth(path: Optional[Path], frames: int) -> list[Optional[BoundingBox]
             for row, absent in zip(rows, is_absent(rows))]
 
 
-def _start_box(init: Optional[Box], truth: list[Optional[BoundingBox]]) -> BoundingBox:
+def _start_box(init: Box | None, truth: list[BoundingBox | None]) -> BoundingBox:
     from lmsco_ros.core import BoundingBox
 
     if init is not None:
@@ -113,7 +113,7 @@ def _title(source: Path) -> str:
 
 
 def _run(tracker: LMSCOTracker, images: Source, start: BoundingBox,
-         truth: list[Optional[BoundingBox]], outputs: RunOutputs, *, limit: Optional[int]) -> None:
+         truth: list[BoundingBox | None], outputs: RunOutputs, *, limit: int | None) -> None:
     """Track, write the outputs and tell the figures."""
     expected = min(len(images), limit or len(images))
     seconds, count, overlaps = 0.0, 0, []

@@ -17,7 +17,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Optional
+from typing import Annotated
 
 import typer
 
@@ -26,7 +26,7 @@ from lmsco_ros.extras import require_extra
 
 NameArgument = Annotated[str, typer.Argument(
     show_default=False, help='Name of the weights, see `lmsco weights list`.')]
-DirectoryOption = Annotated[Optional[Path], typer.Option(
+DirectoryOption = Annotated[Path | None, typer.Option(
     '--directory', file_okay=False, show_default='$LMSCO_WEIGHTS_DIR, else a user cache',
     help='Folder of the weights.')]
 
@@ -108,7 +108,7 @@ def import_file(
         say(f'{name} is here: {import_weights(file, name, directory)}')
 
 
-def _tell_origin(found: Optional[str], published: Optional[str]) -> None:
+def _tell_origin(found: str | None, published: str | None) -> None:
     """Say what is known of the file that verified weights come from."""
     if found is None:
         warn('these weights do not tell the file that they were imported from')

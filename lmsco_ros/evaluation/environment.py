@@ -16,11 +16,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from importlib import metadata
 import os
 from pathlib import Path
 import platform
-from typing import Mapping
 
 import cv2
 

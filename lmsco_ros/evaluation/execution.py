@@ -16,8 +16,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
 import time
-from typing import Callable, Mapping, Optional
 
 import numpy as np
 import numpy.typing as npt
@@ -59,7 +59,7 @@ def run_supervised(tracker: Tracker, sequence: TrackingSequence) -> Trace:
     """
     recorder = _Recorder(tracker, sequence)
     failures: list[int] = []
-    start: Optional[int] = _next_start(sequence, 0)
+    start: int | None = _next_start(sequence, 0)
     while start is not None:
         failure = _track_until_failure(recorder, start)
         if failure is None:
@@ -75,7 +75,7 @@ PROTOCOLS: Mapping[str, Callable[[Tracker, TrackingSequence], Trace]] = {
 }
 
 
-def _track_until_failure(recorder: _Recorder, start: int) -> Optional[int]:
+def _track_until_failure(recorder: _Recorder, start: int) -> int | None:
     if not recorder.start(start):
         return start
     for index in range(start + 1, recorder.frames):
@@ -84,7 +84,7 @@ def _track_until_failure(recorder: _Recorder, start: int) -> Optional[int]:
     return None
 
 
-def _next_start(sequence: TrackingSequence, index: int) -> Optional[int]:
+def _next_start(sequence: TrackingSequence, index: int) -> int | None:
     present = np.flatnonzero(~is_absent(sequence.ground_truth[index:]))
     return index + int(present[0]) if present.size else None
 

@@ -23,7 +23,6 @@ absent; a row of NaN in the answers says that the tracker gave none.
 
 from __future__ import annotations
 
-from typing import Optional
 
 import numpy as np
 import numpy.typing as npt
@@ -58,7 +57,7 @@ def clip_boxes(boxes: Array, size: tuple[int, int]) -> Array:
 
 
 def overlaps(ground_truth: Array, boxes: Array,
-             size: Optional[tuple[int, int]] = None) -> Array:
+             size: tuple[int, int] | None = None) -> Array:
     """
     Return intersection over union for each frame.
 
@@ -112,7 +111,7 @@ def has_jumped(ground_truth: Array) -> npt.NDArray[np.bool_]:
     centers = ground_truth[:, :2] + ground_truth[:, 2:] / 2
     steps = np.linalg.norm(np.diff(centers, axis=0), axis=1)
     sizes = np.sqrt(np.prod(ground_truth[:-1, 2:], axis=1))
-    return np.append(False, steps > _JUMP_SIZES * sizes)
+    return np.concatenate([[False], steps > _JUMP_SIZES * sizes])
 
 
 def is_absent(boxes: Array) -> npt.NDArray[np.bool_]:

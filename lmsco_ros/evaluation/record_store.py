@@ -16,10 +16,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 import hashlib
+from inspect import getfile
 from pathlib import Path
 import re
-from typing import Any, Mapping, Optional
+from typing import Any
 
 from lmsco_ros.evaluation import execution, geometry, trace
 from lmsco_ros.evaluation.datasets import frames
@@ -52,7 +54,7 @@ class RecordStore:
         self._output = output
         self._identities: dict[str, str] = {}
         modules = (execution, frames, geometry, trace)
-        self._code = sources_digest(tuple(Path(module.__file__) for module in modules))
+        self._code = sources_digest(tuple(Path(getfile(module)) for module in modules))
 
     def path(self, job: Job) -> Path:
         """Return where the record of `job` belongs, relative to the output folder."""
@@ -93,7 +95,7 @@ class RecordStore:
             'protocol': job.protocol, **result.to_json()})
 
 
-def read_record(path: Path) -> Optional[Trace]:
+def read_record(path: Path) -> Trace | None:
     """
     Return the trace in a record file, or None when there is no such file.
 

@@ -16,8 +16,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import Iterable, Mapping, Optional, Sequence
 
 from lmsco_ros.evaluation.challenges import CHALLENGES
 from lmsco_ros.evaluation.errors import DatasetError
@@ -108,9 +108,9 @@ def results_page(folders: Sequence[Path], split: Split | None = None) -> str:
     return '\n'.join(parts)
 
 
-def _merged(folders: Iterable[Path], protocol: str) -> Optional[EvaluationRun]:
+def _merged(folders: Iterable[Path], protocol: str) -> EvaluationRun | None:
     """Return one run with the trackers of all folders."""
-    merged: Optional[EvaluationRun] = None
+    merged: EvaluationRun | None = None
     for folder in folders:
         run = read_run(folder, protocol)
         if run is None:
@@ -142,7 +142,7 @@ def _scenes(run: EvaluationRun, scenes: Mapping[str, tuple[str, ...]],
         return [(f'{name}: {CHALLENGES[name].description}', None, name)
                 for name in run.challenges]
     present = {sequence.group for sequence in run.sequences}
-    found: list[tuple[str, Optional[tuple[str, ...]], Optional[str]]] = [
+    found: list[tuple[str, tuple[str, ...] | None, str | None]] = [
         (f'{scene.capitalize()} ({", ".join(groups)})', groups, None)
         for scene, groups in scenes.items() if present & set(groups)]
     return found + [('All sequences', None, None)] if len(found) != 1 else found

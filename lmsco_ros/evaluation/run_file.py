@@ -22,9 +22,10 @@ tables and the report are made from.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Mapping, Optional
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -145,8 +146,8 @@ class EvaluationRun:
         found = dict.fromkeys(sequence.challenge for sequence in self.sequences)
         return tuple(name for name in found if name)
 
-    def only(self, groups: Optional[tuple[str, ...]] = None,
-             challenge: Optional[str] = None) -> EvaluationRun:
+    def only(self, groups: tuple[str, ...] | None = None,
+             challenge: str | None = None) -> EvaluationRun:
         """Return the run on the sequences of `groups` and of `challenge`; None keeps all."""
         kept = [index for index, sequence in enumerate(self.sequences)
                 if (groups is None or sequence.group in groups)
@@ -170,7 +171,7 @@ def write_run(output: Path, protocol: str, sequences: tuple[SequenceInfo, ...],
         'sequences': [sequence.to_json() for sequence in sequences]})
 
 
-def read_run(output: Path, protocol: str) -> Optional[EvaluationRun]:
+def read_run(output: Path, protocol: str) -> EvaluationRun | None:
     """
     Return the run under `protocol`, or None when the folder has none.
 

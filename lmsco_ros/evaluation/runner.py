@@ -16,9 +16,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Generator, Mapping, Sequence
 from contextlib import closing
 from pathlib import Path
-from typing import Any, Generator, Mapping, Sequence
+from typing import Any
 
 from lmsco_ros.evaluation.datasets import BrokenSequence, TrackingSequence
 from lmsco_ros.evaluation.errors import DatasetError, ResultError, SequenceError

@@ -17,12 +17,13 @@
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import date
 from difflib import get_close_matches
 from fnmatch import fnmatch
 from pathlib import Path
-from typing import Any, Optional, Sequence
+from typing import Any
 
 from lmsco_ros.evaluation.challenges import apply_challenge
 from lmsco_ros.evaluation.datasets import BrokenSequence, scan_dataset, TrackingSequence
@@ -59,7 +60,7 @@ class Request:
 
     dataset: Path
     pattern: str = '*'
-    frames: Optional[int] = None
+    frames: int | None = None
     split: Path | None = None
     part: str = 'test'
     challenges: tuple[str, ...] = ()

@@ -16,8 +16,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, Mapping, Optional
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -62,7 +63,7 @@ class Trace:
     updates: int = 0
     cpu_seconds: float = 0.0
     wall_seconds: float = 0.0
-    error: Optional[str] = None
+    error: str | None = None
 
     @classmethod
     def unanswered(cls, frames: int, error: str) -> Trace:
@@ -110,5 +111,5 @@ class Trace:
                    error=None if error is None else the_text(error))
 
 
-def _plain(values: npt.NDArray[np.float64]) -> list[Optional[float]]:
+def _plain(values: npt.NDArray[np.float64]) -> list[float | None]:
     return [round(float(value), _DECIMALS) if np.isfinite(value) else None for value in values]

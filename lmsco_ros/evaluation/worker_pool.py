@@ -27,6 +27,7 @@ and nothing outlives its end or that of this process, however that came.
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Generator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 import multiprocessing
@@ -35,7 +36,7 @@ import os
 import signal
 import sys
 import threading
-from typing import Any, Generator, Sequence, Union
+from typing import Any
 
 import cv2
 from threadpoolctl import threadpool_limits
@@ -66,7 +67,7 @@ class Unreadable:
     reason: str
 
 
-Outcome = Union[Trace, Unreadable]
+Outcome = Trace | Unreadable
 
 
 def run_jobs(jobs: Sequence[Job], workers: int,

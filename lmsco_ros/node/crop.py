@@ -73,8 +73,9 @@ class Crop:
         """Return a picture of the full size, black where it was cut off."""
         if self == Crop():
             return remaining
-        return cv2.copyMakeBorder(remaining, self.top, self.bottom, self.left, self.right,
-                                  cv2.BORDER_CONSTANT)
+        picture = cv2.copyMakeBorder(remaining, self.top, self.bottom, self.left, self.right,
+                                     cv2.BORDER_CONSTANT)
+        return np.asarray(picture, np.uint8)
 
     def inwards(self, box: BoundingBox) -> BoundingBox:
         """Return a box of the full image, as seen in what remains."""

@@ -16,4 +16,5 @@
 
 from lmsco_ros.extras import require_extra
 
-require_extra('cli', 'lmsco_ros.replay', 'matplotlib', 'rosbags')
+require_extra('cli', 'lmsco_ros.replay', 'backports.zstd', 'lz4',
+              'matplotlib', 'rosbags')

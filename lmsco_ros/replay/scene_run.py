@@ -105,13 +105,13 @@ class SceneRun:
             try:
                 # The scene stands still until the node has taken up the target.
                 player.start(first.box, origin + first.stamp_ns)
-                self._send(first, origin)
+                self._send(player, first, origin)
                 player.settle(allowed=0)
                 began = time.monotonic() - first.stamp_ns * 1e-9
                 for frame in self._frames[1:]:
                     player.listen_until(began + frame.stamp_ns * 1e-9)
                     self._tell()
-                    self._send(frame, origin)
+                    self._send(player, frame, origin)
                 player.finish()
             finally:
                 self._tell()
@@ -124,9 +124,9 @@ class SceneRun:
         """
         return [item for _, item in self._answered(0, self._frames[0].box)]
 
-    def _send(self, frame: SceneFrame, origin: int) -> None:
+    def _send(self, player: Player, frame: SceneFrame, origin: int) -> None:
         stamp = origin + frame.stamp_ns
-        self._player.send(stamp, message_from_image(
+        player.send(stamp, message_from_image(
             frame.image, header=header_at(stamp, 'thermal_camera')))
         self._on_sent()
 

@@ -145,5 +145,5 @@ def _distance(capsule: Capsule, x: npt.NDArray[np.float32],
     along_x, along_y = capsule.x1 - capsule.x0, capsule.y1 - capsule.y0
     squared = max(along_x ** 2 + along_y ** 2, 1e-9)
     place = np.clip(((x - capsule.x0) * along_x + (y - capsule.y0) * along_y) / squared, 0, 1)
-    return np.hypot(x - capsule.x0 - place * along_x,
-                    y - capsule.y0 - place * along_y) - capsule.radius
+    distance = np.hypot(x - capsule.x0 - place * along_x, y - capsule.y0 - place * along_y)
+    return np.asarray(distance - capsule.radius, np.float32)

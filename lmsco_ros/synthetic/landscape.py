@@ -61,7 +61,7 @@ def render_landscape(width: int, height: int, clutter: int,
     surface = 12 * _texture((height, width), 0.02 * height, rng)
     for _ in range(clutter):
         _place_clutter(scene, surface, rng)
-    return cv2.GaussianBlur(scene, (0, 0), 0.7)
+    return np.asarray(cv2.GaussianBlur(scene, (0, 0), 0.7), np.float32)
 
 
 def _place_clutter(scene: npt.NDArray[np.float32], surface: npt.NDArray[np.float32],

@@ -186,8 +186,9 @@ def _look(panorama: npt.NDArray[np.float32], pan: tuple[float, float],
           shape: tuple[int, int]) -> npt.NDArray[np.float32]:
     """Return the part of the panorama in view, to a fraction of a pixel."""
     shift = np.array([[1, 0, pan[0]], [0, 1, pan[1]]], np.float64)
-    return cv2.warpAffine(panorama, shift, shape[::-1], borderMode=cv2.BORDER_REPLICATE,
+    view = cv2.warpAffine(panorama, shift, shape[::-1], borderMode=cv2.BORDER_REPLICATE,
                           flags=cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP)
+    return np.asarray(view, np.float32)
 
 
 def _compose(scene: npt.NDArray[np.float32], cast: _Cast) -> float:

@@ -60,7 +60,7 @@ class Sensor:
         The optics blur by 0.6 pixels; the offset of the whole frame drifts by some
         counts over a minute, as the housing warms up.
         """
-        frame = cv2.GaussianBlur(scene, (5, 5), 0.6)
+        frame = np.asarray(cv2.GaussianBlur(scene, (5, 5), 0.6), np.float32)
         frame += self._pattern
         frame += self._draw_noise()
         frame += np.float32(0.5 + 12 * math.sin(2 * math.pi * time / 60))

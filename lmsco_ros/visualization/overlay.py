@@ -64,7 +64,8 @@ def draw_overlay(image: npt.NDArray, result: TrackResult | None, *,
 
     """
     view = DisplayRange().apply(image)
-    canvas = view.copy() if view.ndim == 3 else cv2.cvtColor(view, cv2.COLOR_GRAY2BGR)
+    canvas = np.asarray(
+        view.copy() if view.ndim == 3 else cv2.cvtColor(view, cv2.COLOR_GRAY2BGR), np.uint8)
     if result is not None:
         draw_box(canvas, result.box, state_color(result.state),
                  dashed=result.state is TrackState.LOST)

@@ -87,7 +87,9 @@ class OverlayVideo:
         large = cv2.resize(view, None, fx=factor, fy=factor, interpolation=cv2.INTER_CUBIC) \
             if factor > 1 else view
         if truth is not None:
-            large = cv2.cvtColor(large, cv2.COLOR_GRAY2BGR) if large.ndim == 2 else large.copy()
+            large = np.asarray(
+                cv2.cvtColor(large, cv2.COLOR_GRAY2BGR) if large.ndim == 2 else large.copy(),
+                np.uint8)
             draw_box(large, scaled(truth, factor), _TRUTH_COLOR, thickness=1)
         canvas = draw_overlay(large, replace(result, box=scaled(result.box, factor)),
                               label=label)

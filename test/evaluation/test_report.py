@@ -87,7 +87,8 @@ def runs(sequences):
     """Return a run under each protocol."""
     infos = tuple(SequenceInfo(item.name, item.group, (64, 48), item.ground_truth,
                                item.attributes) for item in sequences)
-    context = {'dataset': 'thermal', 'split': 'thermal.yaml', 'part': 'test', 'jobs': 2, 'date': '2026-01-01',
+    context = {'dataset': 'thermal', 'split': 'thermal.yaml', 'part': 'test', 'jobs': 2,
+               'date': '2026-01-01',
                'machine': {'processor': 'Abacus 3000', 'cores': '2'},
                'versions': {'numpy': '9.9'},
                'skipped': [{'name': 'x/broken', 'reason': 'no frames'}]}

@@ -21,8 +21,8 @@ import sys
 import pytest
 
 REPOSITORY = Path(__file__).resolve().parents[2]
-OF_EXTRAS = {'av', 'google', 'jinja2', 'matplotlib', 'platformdirs', 'requests', 'rich', 'rosbags',
-             'scipy.io', 'typer', 'urllib3'}
+OF_EXTRAS = {'av', 'backports', 'google', 'jinja2', 'lz4', 'matplotlib', 'platformdirs',
+             'requests', 'rich', 'rosbags', 'scipy.io', 'typer', 'urllib3'}
 TRACKER = 'from lmsco_ros.core import LMSCOTracker; LMSCOTracker({!r})'
 NODE = """
 import rclpy

@@ -34,15 +34,16 @@ from lmsco_ros.extras import MODULES
 REPOSITORY = Path(__file__).resolve().parents[2]
 LIBRARIES = ('lmsco_ros', 'msg_adapters')
 # Installed from the package index where ROS 2 is: Ubuntu 24.04 has no package of them, or one that
-# is too old (protobuf).
+# is too old (protobuf, typer).
 WITHOUT_ROSDEP_KEY = {
     'array-api-compat', 'av', 'backports-zstd', 'lz4', 'protobuf', 'rosbags', 'safetensors',
-    'threadpoolctl', 'torch'}
+    'threadpoolctl', 'torch', 'typer'}
 # The others are for evaluation against foreign code and stay out of the environment.
 INSTALLED_EXTRA = re.compile(r'extra == "(cli|eval|weights|ros|test)"')
 OF_EXTRA = re.compile(r'extra == "(cli|eval|weights)"')
 # Modules by distributions where the names differ.
-DISTRIBUTIONS = {'google.protobuf': 'protobuf', 'trax': 'vot-trax'}
+DISTRIBUTIONS = {
+    'backports.zstd': 'backports-zstd', 'google.protobuf': 'protobuf', 'trax': 'vot-trax'}
 ROSDEP_KEYS = {'opencv-python-headless': 'python3-opencv', 'pyyaml': 'python3-yaml'}
 
 

@@ -63,7 +63,7 @@ class _Text:
             cv2.putText(cover, word, place, _FONT, scale, 255, thickness, cv2.LINE_AA)
         cv2.drawMarker(cover, (width // 2, height // 2), 255, cv2.MARKER_CROSS, width // 12,
                        thickness)
-        return cover.astype(np.float32) / 255
+        return cover.astype(np.float32) / np.float32(255)
 
 
 def text(sequence: TrackingSequence) -> TrackingSequence:

@@ -119,7 +119,7 @@ def _filled(truth: Array) -> Array:
 def _smooth(path: Array) -> Array:
     """Return a path (n, 2) without its fast movements."""
     size = 1, _FOLLOWED_FRAMES
-    return cv2.blur(path, size, borderType=cv2.BORDER_REPLICATE)
+    return np.asarray(cv2.blur(path, size, borderType=cv2.BORDER_REPLICATE), np.float64)
 
 
 def _seen(truth: Array, size: npt.NDArray[np.int_]) -> Array:

@@ -122,7 +122,7 @@ def twin(sequence: TrackingSequence) -> TrackingSequence:
     distance *= max(width, np.sqrt(width * height))
     offsets = distance[:, None] * np.stack([side * np.cos(angle), np.sin(angle)], axis=1)
     return replace(sequence, frames=ChangedFrames(
-        sequence, frames, _Twin(sequence.ground_truth, offsets), 'twin'))
+        sequence, frames.tolist(), _Twin(sequence.ground_truth, offsets), 'twin'))
 
 
 def _middle(sequence: TrackingSequence, duration: int) -> int:

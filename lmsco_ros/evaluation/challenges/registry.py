@@ -16,9 +16,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import Callable, Mapping
 
 from lmsco_ros.evaluation.challenges.burnt_in_text import text
 from lmsco_ros.evaluation.challenges.leaving import leave

@@ -49,7 +49,7 @@ def shutter(sequence: TrackingSequence) -> TrackingSequence:
     order = np.where(closed, frames - since, frames)
     attributes = {name: flags[order] for name, flags in sequence.attributes.items()}
     return replace(sequence, ground_truth=sequence.ground_truth[order], attributes=attributes,
-                   frames=ChangedFrames(sequence, order, Unchanged(), 'shutter'))
+                   frames=ChangedFrames(sequence, order.tolist(), Unchanged(), 'shutter'))
 
 
 @dataclass(frozen=True)

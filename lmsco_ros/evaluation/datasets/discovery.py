@@ -16,9 +16,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Iterable, Iterator, Union
 
 from lmsco_ros.evaluation.datasets.frames import image_folder
 from lmsco_ros.evaluation.datasets.layouts import FRAME_FOLDERS, Plan, READERS
@@ -80,7 +80,7 @@ def scan_dataset(root: Path) -> DatasetScan:
         broken=tuple(item for item in found if isinstance(item, BrokenSequence)))
 
 
-def _walk(folder: Path, depth: int) -> Iterator[Union[TrackingSequence, BrokenSequence]]:
+def _walk(folder: Path, depth: int) -> Iterator[TrackingSequence | BrokenSequence]:
     name = f'{folder.parent.name}/{folder.name}'
     try:
         plans = next(filter(None, (reader(folder) for reader in READERS)), ())
@@ -98,15 +98,15 @@ def _walk(folder: Path, depth: int) -> Iterator[Union[TrackingSequence, BrokenSe
             yield from _walk(child, depth - 1)
 
 
-def _read(plan: Plan) -> Union[TrackingSequence, BrokenSequence]:
+def _read(plan: Plan) -> TrackingSequence | BrokenSequence:
     try:
         return plan.read()
     except (SequenceError, OSError) as error:
         return BrokenSequence(f'{plan.group}/{plan.name}', str(error))
 
 
-def _told_apart(found: Iterable[Union[TrackingSequence, BrokenSequence]],
-                ) -> Iterator[Union[TrackingSequence, BrokenSequence]]:
+def _told_apart(found: Iterable[TrackingSequence | BrokenSequence],
+                ) -> Iterator[TrackingSequence | BrokenSequence]:
     """Yield what was found; of several sequences of one name only the first is usable."""
     names: set[str] = set()
     for item in found:

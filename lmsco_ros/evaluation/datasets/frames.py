@@ -18,7 +18,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Optional, Protocol
+from typing import Protocol
 
 import numpy.typing as npt
 
@@ -75,13 +75,13 @@ class StoredFrames:
             raise SequenceError(str(error)) from error
 
 
-def image_folder(folder: Path) -> Optional[StoredFrames]:
+def image_folder(folder: Path) -> StoredFrames | None:
     """Return the images of `folder` in the order of their names, or None without any."""
     images = ImageFiles.in_folder(folder)
     return None if images is None else StoredFrames(images)
 
 
-def thermal_video(folder: Path) -> Optional[StoredFrames]:
+def thermal_video(folder: Path) -> StoredFrames | None:
     """
     Return the first video of `folder` that is not the visible-light one, or None.
 

@@ -16,9 +16,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 import hashlib
-from typing import Mapping
 
 import numpy as np
 import numpy.typing as npt

@@ -21,8 +21,8 @@ drawing is seeded: the same results give the same interval.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Callable
 
 import numpy as np
 

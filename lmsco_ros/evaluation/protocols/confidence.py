@@ -16,8 +16,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Optional, Sequence
 
 import numpy as np
 import numpy.typing as npt
@@ -53,7 +53,7 @@ class LostFigures:
 
     """
 
-    delays: tuple[Optional[int], ...]
+    delays: tuple[int | None, ...]
     false_alarms: int
     frames_present: int
     lost_while_present: int
@@ -85,7 +85,7 @@ class ReturnFigures:
 
     absent: int
     claimed: int
-    delays: tuple[Optional[int], ...]
+    delays: tuple[int | None, ...]
     mistaken: int
 
 
@@ -194,7 +194,7 @@ def return_figures(ground_truth: Array, trace: Trace, overlap: Array) -> ReturnF
         mistaken=sum(mistaken for _, mistaken in outcomes))
 
 
-def _outcome(claimed: Flags, overlap: Array) -> tuple[Optional[int], bool]:
+def _outcome(claimed: Flags, overlap: Array) -> tuple[int | None, bool]:
     """Return the delay of a return, and whether a box was claimed elsewhere before."""
     delay = _delay(claimed & (overlap > GOOD_OVERLAP))
     return delay, bool((claimed & (overlap == 0))[:delay].any())
@@ -218,5 +218,5 @@ def _absences(absent: Flags) -> list[tuple[int, int]]:
             for start in starts]
 
 
-def _delay(lost: Flags) -> Optional[int]:
+def _delay(lost: Flags) -> int | None:
     return int(np.argmax(lost)) if lost.any() else None

@@ -28,7 +28,7 @@ a weak tracker has long failed, and so overrates it.
 
 from __future__ import annotations
 
-from typing import Sequence
+from collections.abc import Sequence
 
 import numpy as np
 

@@ -22,9 +22,9 @@ Trackers" (2016). A failure is a frame without overlap; the next start is
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 import math
-from typing import Sequence
 
 import numpy as np
 import numpy.typing as npt

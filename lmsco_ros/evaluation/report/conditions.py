@@ -16,8 +16,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 import shlex
-from typing import Mapping
 
 from lmsco_ros.evaluation.run_file import EvaluationRun
 

@@ -16,7 +16,7 @@
 
 from __future__ import annotations
 
-from typing import Sequence
+from collections.abc import Sequence
 
 from matplotlib.figure import Figure
 from matplotlib.ticker import FixedLocator, FuncFormatter, NullLocator
@@ -26,7 +26,7 @@ from lmsco_ros.evaluation.geometry import Array
 from lmsco_ros.evaluation.protocols.one_pass import (
     NORMALIZED_THRESHOLDS, PRECISION_THRESHOLDS, SUCCESS_THRESHOLDS)
 from lmsco_ros.evaluation.report.formatting import number
-from lmsco_ros.evaluation.report.style import legend, looks, new_axes
+from lmsco_ros.evaluation.report.style import legend, looks, new_axes, Place
 from lmsco_ros.evaluation.summaries.one_pass import OnePassSummary
 
 Summaries = Sequence[OnePassSummary]
@@ -55,7 +55,7 @@ def one_pass_plots(summaries: Summaries) -> dict[str, Figure]:
 
 
 def _curves(title: str, x_label: str, y_label: str, thresholds: Array,
-            curves: list[tuple[str, Array, float]], place: str) -> Figure:
+            curves: list[tuple[str, Array, float]], place: Place) -> Figure:
     figure, axes = new_axes(title, x_label, y_label)
     style = looks(name for name, _, _ in curves)
     for name, values, score in sorted(curves, key=lambda curve: -curve[2]):

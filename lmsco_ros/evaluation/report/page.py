@@ -17,11 +17,12 @@
 from __future__ import annotations
 
 import base64
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from importlib import resources
 from io import BytesIO
 from pathlib import Path
-from typing import Any, Iterable, Mapping, Optional
+from typing import Any
 
 from jinja2 import Environment, StrictUndefined
 from matplotlib.figure import Figure
@@ -134,7 +135,7 @@ def _confidence(run: EvaluationRun, challenge: str) -> dict[str, Any]:
             'absence': absence_table(summaries)}
 
 
-def _challenges(run: EvaluationRun, aucs: Mapping[str, Any]) -> Optional[Table]:
+def _challenges(run: EvaluationRun, aucs: Mapping[str, Any]) -> Table | None:
     """Return the mean success AUC under each challenge, with the number of sequences."""
     marks = np.array([sequence.challenge for sequence in run.sequences])
     rows = tuple(
@@ -158,7 +159,7 @@ def _supervised(run: EvaluationRun, folder: Path) -> dict[str, Any]:
     }
 
 
-def _attributes(run: EvaluationRun, counted: str) -> Optional[Table]:
+def _attributes(run: EvaluationRun, counted: str) -> Table | None:
     rows = []
     for tracker, figures in summarize_attributes(run).items():
         cells = tuple(Cell(number(item.mean_overlap), str(getattr(item, counted)))
@@ -191,7 +192,7 @@ def _sequence_table(runs: Mapping[str, EvaluationRun],
                                      if failures else '.')}
 
 
-def _failure_counts(run: Optional[EvaluationRun]) -> dict[tuple[str, str], int]:
+def _failure_counts(run: EvaluationRun | None) -> dict[tuple[str, str], int]:
     if run is None:
         return {}
     return {(name, sequence.full_name): len(trace.failures)
@@ -199,7 +200,7 @@ def _failure_counts(run: Optional[EvaluationRun]) -> dict[tuple[str, str], int]:
             for sequence, trace in zip(run.sequences, traces)}
 
 
-def _heat(value: float, failures: Optional[int]) -> _Heat:
+def _heat(value: float, failures: int | None) -> _Heat:
     """Return a cell that goes from red at 0 over white at one half to green at 1."""
     strength = min(abs(value - 0.5) * 2, 1) if np.isfinite(value) else 0
     tint = '42, 157, 88' if value >= 0.5 else '193, 18, 31'

@@ -16,8 +16,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Sequence
 
 import cv2
 from matplotlib.colors import to_rgb
@@ -98,7 +98,8 @@ def _display(image: npt.NDArray) -> Picture:
         low, high = np.percentile(image[np.isfinite(image)], (0.5, 99.5))
         scaled = (image.astype(np.float32) - low) * (255 / max(float(high - low), 1e-6))
         image = np.clip(np.nan_to_num(scaled), 0, 255).astype(np.uint8)
-    return cv2.cvtColor(image, cv2.COLOR_GRAY2BGR) if image.ndim == 2 else image
+    return np.asarray(
+        cv2.cvtColor(image, cv2.COLOR_GRAY2BGR) if image.ndim == 2 else image, np.uint8)
 
 
 def _whole(view: Picture) -> npt.NDArray[np.float64]:
@@ -127,7 +128,7 @@ def _panel(view: Picture, region: npt.NDArray[np.float64], marks: list[_Mark],
     offset = (np.array(size) - region[2:] * scale) / 2 - region[:2] * scale
     transform = np.array([[scale, 0, offset[0]], [0, scale, offset[1]]])
     method = cv2.INTER_AREA if scale < 1 else cv2.INTER_CUBIC
-    panel = cv2.warpAffine(view, transform, size, flags=method)
+    panel = np.asarray(cv2.warpAffine(view, transform, size, flags=method), np.uint8)
     for mark in marks:
         if np.isfinite(mark.box).all():
             low = np.round(mark.box[:2] * scale + offset).astype(int)

@@ -16,8 +16,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Iterable
+from typing import Literal
 
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -28,6 +29,8 @@ _MARKERS = 'osD^vP*X<>hp'
 _SIZE = (5.6, 4.2)
 _GRID = '#e3e6ea'
 _TEXT = '#333a44'
+
+Place = Literal['lower left', 'lower right', 'upper right']
 
 
 @dataclass(frozen=True)
@@ -66,7 +69,7 @@ def style_axes(axes: Axes, title: str, x_label: str, y_label: str) -> None:
         axes.spines[side].set_color('#aab2bd')
 
 
-def legend(axes: Axes, place: str) -> None:
+def legend(axes: Axes, place: Place) -> None:
     """Add a legend of the trackers."""
     axes.legend(loc=place, fontsize=8, frameon=True, framealpha=0.9, edgecolor=_GRID)
 

@@ -16,9 +16,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 import math
-from typing import Callable, Generic, Optional, Sequence, TypeVar
+from typing import Generic, TypeVar
 
 from lmsco_ros.evaluation.protocols.bootstrap import Estimate
 from lmsco_ros.evaluation.report.formatting import interval, number, signed
@@ -27,7 +28,7 @@ from lmsco_ros.evaluation.summaries.differences import Difference
 from lmsco_ros.evaluation.summaries.one_pass import OnePassSummary
 from lmsco_ros.evaluation.summaries.supervised import SupervisedSummary
 
-Summary = TypeVar('Summary')
+Summary = TypeVar('Summary', OnePassSummary, SupervisedSummary, ConfidenceSummary)
 
 
 @dataclass(frozen=True)
@@ -45,7 +46,7 @@ class Row:
 
     tracker: str
     cells: tuple[Cell, ...]
-    bar: Optional[Estimate] = None
+    bar: Estimate | None = None
 
 
 @dataclass(frozen=True)
@@ -136,7 +137,7 @@ def confidence_table(summaries: Sequence[ConfidenceSummary]) -> Table:
     return _table(columns, summaries, None)
 
 
-def absence_table(summaries: Sequence[ConfidenceSummary]) -> Optional[Table]:
+def absence_table(summaries: Sequence[ConfidenceSummary]) -> Table | None:
     """Return the table of targets that left and came back, None where none did."""
     if not any(item.departures or item.absent or item.returns for item in summaries):
         return None
@@ -163,7 +164,7 @@ def difference_rows(differences: Sequence[Difference], decimals: int) -> tuple[D
 
 
 def _table(columns: Sequence[_Column[Summary]], summaries: Sequence[Summary],
-           bar: Optional[Callable[[Summary], Estimate]]) -> Table:
+           bar: Callable[[Summary], Estimate] | None) -> Table:
     best = [_best(column, summaries) for column in columns]
     rows = tuple(
         Row(tracker=summary.tracker, bar=bar(summary) if bar else None,

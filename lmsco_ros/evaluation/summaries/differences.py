@@ -16,8 +16,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Mapping, Optional
 
 from lmsco_ros.evaluation.geometry import Array
 from lmsco_ros.evaluation.protocols.bootstrap import Estimate, paired_difference
@@ -67,7 +67,7 @@ def enough_sequences(sequences: int) -> bool:
     return sequences >= FEWEST_SEQUENCES
 
 
-def reference_of(trackers: tuple[str, ...]) -> Optional[str]:
+def reference_of(trackers: tuple[str, ...]) -> str | None:
     """Return the tracker that the others are compared with, None where there is one only."""
     if len(trackers) < 2:
         return None

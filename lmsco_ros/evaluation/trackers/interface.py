@@ -16,7 +16,7 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple, Optional, Protocol
+from typing import NamedTuple, Protocol
 
 import numpy.typing as npt
 
@@ -38,8 +38,8 @@ class Answer(NamedTuple):
 
     """
 
-    box: Optional[BoundingBox]
-    score: Optional[float]
+    box: BoundingBox | None
+    score: float | None
     state: TrackState
 
 

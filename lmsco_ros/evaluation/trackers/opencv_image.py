@@ -48,4 +48,5 @@ class EightBitView:
         if image.dtype != np.uint8:
             scaled = image.astype(np.float32) * self._gain + self._offset
             image = np.clip(np.nan_to_num(scaled), 0, 255).astype(np.uint8)
-        return cv2.cvtColor(image, cv2.COLOR_GRAY2BGR) if image.ndim == 2 else image
+        return np.asarray(
+            cv2.cvtColor(image, cv2.COLOR_GRAY2BGR) if image.ndim == 2 else image, np.uint8)

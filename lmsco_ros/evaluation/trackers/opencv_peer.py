@@ -21,10 +21,11 @@ its contrib build (extra `peers`). NanoTrack and ViT need model files from the u
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 import hashlib
 from pathlib import Path
-from typing import Any, Callable, Mapping, Optional
+from typing import Any
 
 import cv2
 import numpy.typing as npt
@@ -85,14 +86,14 @@ class OpenCVTracker:
         self._create = create
         self._smallest_side = smallest_side
         self._shrink = (1.0, 1.0)
-        self._view: Optional[EightBitView] = None
+        self._view: EightBitView | None = None
         self._tracker: Any = None
-        self._last: Optional[BoundingBox] = None
+        self._last: BoundingBox | None = None
 
     def initialize(self, image: npt.NDArray, box: BoundingBox) -> None:
         """Start a new OpenCV tracker on `box`."""
-        padded = BoundingBox.from_center(
-            box.center, tuple(max(side, self._smallest_side) for side in box.size))
+        padded = BoundingBox.from_center(box.center, (
+            max(box.width, self._smallest_side), max(box.height, self._smallest_side)))
         self._shrink = box.width / padded.width, box.height / padded.height
         self._view = EightBitView(image)
         self._tracker = self._create()
@@ -101,6 +102,7 @@ class OpenCVTracker:
 
     def update(self, image: npt.NDArray) -> Answer:
         """Track into `image`; the last box stays where OpenCV reports none."""
+        assert self._view is not None, 'it starts with `initialize`'
         found, region = self._tracker.update(self._view(image))
         if found and region[2] > 0 and region[3] > 0:
             outer = BoundingBox(*map(float, region))
@@ -112,7 +114,7 @@ class OpenCVTracker:
     def close(self) -> None:
         """Release nothing; OpenCV counts references."""
 
-    def _score(self) -> Optional[float]:
+    def _score(self) -> float | None:
         """Return OpenCV's score, which is -1 for trackers that do not have one."""
         ask = getattr(self._tracker, 'getTrackingScore', None)
         score = float(ask()) if ask else -1.0

@@ -27,7 +27,7 @@ import math
 import shlex
 import shutil
 import subprocess
-from typing import Any, Optional
+from typing import Any, IO
 
 import numpy as np
 import numpy.typing as npt
@@ -57,9 +57,9 @@ class TraxTracker:
         """Find the TraX library; the server starts with the first target."""
         self._trax = _import_trax()
         self._command = command
-        self._process: Optional[subprocess.Popen] = None
+        self._process: subprocess.Popen[bytes] | None = None
         self._client: Any = None
-        self._view: Optional[EightBitView] = None
+        self._view: EightBitView | None = None
 
     def initialize(self, image: npt.NDArray, box: BoundingBox) -> None:
         """Start a fresh server on `box`."""
@@ -67,10 +67,11 @@ class TraxTracker:
         self._process = subprocess.Popen(
             shlex.split(self._command), stdin=subprocess.PIPE, stdout=subprocess.PIPE,
             stderr=subprocess.DEVNULL)
-        streams = [stream.fileno() for stream in (self._process.stdin, self._process.stdout)]
+        streams = _pipes(self._process)
         try:
             # The library cannot be called without a log function.
-            self._client = self._trax.client.Client(stream=tuple(streams), log=lambda text: None)
+            self._client = self._trax.client.Client(
+                stream=tuple(stream.fileno() for stream in streams), log=lambda text: None)
             self._view = EightBitView(image)
             region = self._trax.region.Rectangle.create(*box.as_tuple())
             self._client.initialize(self._images(image), [(region, {})], {})
@@ -96,17 +97,19 @@ class TraxTracker:
             self._client.quit()
             self._client = None
         if self._process is not None:
-            self._process.stdin.close()
+            written, read = _pipes(self._process)
+            written.close()
             try:
                 self._process.wait(_SECONDS_TO_QUIT)
             except subprocess.TimeoutExpired:
                 self._process.kill()
                 self._process.wait()
-            self._process.stdout.close()
+            read.close()
             self._process = None
 
     def _images(self, image: npt.NDArray) -> dict[str, Any]:
         """Return one image for each channel that the server asked for."""
+        assert self._view is not None, 'it starts with `initialize`'
         gray16 = image.ndim == 2 and image.dtype == np.uint16
         sent = image if gray16 or image.dtype == np.uint8 else self._view(image)
         if sent.ndim == 3:
@@ -114,7 +117,7 @@ class TraxTracker:
         picture = self._trax.image.MemoryImage.create(np.ascontiguousarray(sent))
         return {channel: picture for channel in self._client.channels}
 
-    def _box(self, region: Any) -> Optional[BoundingBox]:
+    def _box(self, region: Any) -> BoundingBox | None:
         if region.type == self._trax.region.Region.POLYGON:
             corners = np.array(list(region))
             low, high = corners.min(axis=0), corners.max(axis=0)
@@ -163,9 +166,15 @@ class TraxSpec:
         return client
 
 
-def _state(word: Optional[str], box: Optional[BoundingBox]) -> TrackState:
+def _pipes(process: subprocess.Popen[bytes]) -> tuple[IO[bytes], IO[bytes]]:
+    """Return what a process reads from and what it writes to."""
+    assert process.stdin is not None and process.stdout is not None, 'it was started with both'
+    return process.stdin, process.stdout
+
+
+def _state(word: str | None, box: BoundingBox | None) -> TrackState:
     """Return what the server says of its state, as ours does, or what the region tells."""
-    known = {state.value: state for state in TrackState}
+    known: dict[str | None, TrackState] = {state.value: state for state in TrackState}
     return known.get(word, TrackState.LOST if box is None else TrackState.TRACKING)
 
 
