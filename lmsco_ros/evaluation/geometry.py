@@ -111,9 +111,9 @@ def has_jumped(ground_truth: Array) -> npt.NDArray[np.bool_]:
     centers = ground_truth[:, :2] + ground_truth[:, 2:] / 2
     steps = np.linalg.norm(np.diff(centers, axis=0), axis=1)
     sizes = np.sqrt(np.prod(ground_truth[:-1, 2:], axis=1))
-    return np.concatenate([[False], steps > _JUMP_SIZES * sizes])
+    return np.append(False, steps > _JUMP_SIZES * sizes)
 
 
 def is_absent(boxes: Array) -> npt.NDArray[np.bool_]:
     """Return for each row, shape (n,), whether it is no box at all."""
-    return ~np.isfinite(boxes).all(axis=1)
+    return np.asarray(~np.isfinite(boxes).all(axis=1), np.bool_)
