@@ -94,7 +94,7 @@ class Outputs:
             self._detections.publish(_detections(found, outcome.track_id, header))
         if _is_heard(self._marker):
             self._marker.publish(self._outline(found, header))
-        if result is not None and _is_heard(self._confidence):
+        if result is not None and outcome.image is not None and _is_heard(self._confidence):
             self._confidence.publish(message_from_confidence(
                 result.confidence_map, result.search_region.as_tuple(),
                 crop.full_shape(outcome.image), header))
@@ -134,7 +134,8 @@ class Outputs:
     def _frame_status(self, outcome: Outcome, dropped_frames: int,
                       published: float) -> FrameStatus:
         result, reading = outcome.result, None
-        if result is not None and result.state is not TrackState.LOST:
+        if result is not None and outcome.image is not None \
+                and result.state is not TrackState.LOST:
             reading = target_reading(outcome.image, result.box.as_tuple())
         settings = self.settings
         return frame_status(

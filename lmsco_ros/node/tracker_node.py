@@ -133,6 +133,7 @@ class TrackerNode(GuardedNode):
     @_reported
     def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Start to receive and track."""
+        assert self._tracker is not None and self._outputs is not None, 'it is configured'
         self._session = TrackingSession(
             self, self.settings, self._tracker, self._outputs, self._monitor)
         self.get_logger().info(f'waiting for images on {self._session.image_topic}')
@@ -217,7 +218,8 @@ class TrackerNode(GuardedNode):
         self._monitor.warned(warning)
 
     def _report_health(self) -> None:
-        problem, dropped = Problem(Level.WARN, 'the node is not active'), 0
+        problem: Problem | None = Problem(Level.WARN, 'the node is not active')
+        dropped = 0
         if self._session is not None:
             problem = self._session.problem(self.settings.no_image_timeout)
             dropped = self._session.worker.dropped_frames

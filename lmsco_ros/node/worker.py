@@ -304,8 +304,9 @@ class TrackerWorker:
                                   finished if started is None else started, finished, image))
 
 
-def _unknown_stamp(stamp: int, history: FrameHistory[Frame]) -> str:
+def _unknown_stamp(stamp: int | None, history: FrameHistory[Frame]) -> str:
     """Say why a start on a certain frame cannot be met."""
+    assert stamp is not None, 'a start without a stamp takes the newest frame'
     first, last = history.first.stamp / NANOSECONDS, history.last.stamp / NANOSECONDS
     return (f'no frame with the stamp {stamp / NANOSECONDS:.9f} is kept (there are '
             f'{len(history)} from {first:.9f} to {last:.9f}); copy the stamp of the image that '
