@@ -27,7 +27,7 @@ import sys
 
 import numpy as np
 
-from benchmarks.measurement import CLOCKS, load_config
+from benchmarks.measurement import CLOCKS, named_config
 from benchmarks.stages import instrumented, StageClock
 from lmsco_ros.core import BoundingBox, LMSCOTracker
 
@@ -36,7 +36,7 @@ def main(config: str, clip: str) -> None:
     """Answer every line with the times of one frame."""
     with np.load(clip) as arrays:
         frames, start = arrays['frames'], BoundingBox(*map(float, arrays['start']))
-    tracker = LMSCOTracker(load_config(config))
+    tracker = LMSCOTracker(named_config(config))
     clock = StageClock(CLOCKS['processor'])
     with instrumented(clock):
         tracker.initialize(frames[0], start)

@@ -25,7 +25,7 @@ import numpy as np
 
 from lmsco_ros.core import TrackerConfig
 
-__all__ = ['CLOCKS', 'Contestant', 'PROCESSOR', 'WALL', 'load_config', 'markdown_table',
+__all__ = ['CLOCKS', 'Contestant', 'PROCESSOR', 'WALL', 'named_config', 'markdown_table',
            'positive', 'take_turns', 'timed']
 
 PROCESSOR, WALL = 0, 1
@@ -82,7 +82,7 @@ def take_turns(contestants: Sequence[Contestant], rounds: int) -> np.ndarray:
     return seconds
 
 
-def load_config(text: str) -> TrackerConfig:
+def named_config(text: str) -> TrackerConfig:
     """Return the preset of that name, or what the YAML file of that name says."""
     if text in TrackerConfig.preset_names():
         return TrackerConfig.preset(text)

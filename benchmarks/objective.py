@@ -36,7 +36,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, NullLocator
 import numpy as np
 
-from benchmarks.measurement import load_config, markdown_table, positive
+from benchmarks.measurement import markdown_table, named_config, positive
 from benchmarks.scenes import Clip, recorded_clips, walking_scene
 from lmsco_ros.core import LMSCOTracker, TrackerConfig
 from lmsco_ros.core.backend import Array, Backend
@@ -237,7 +237,7 @@ def main(arguments: list[str] | None = None) -> None:
     parser.add_argument('--frames', type=positive, default=300)
     parser.add_argument('--output', type=Path, default=Path('output/objective.png'))
     options = parser.parse_args(arguments)
-    config, clip = load_config(options.config), chosen_clip(options)
+    config, clip = named_config(options.config), chosen_clip(options)
     lesson = record_lesson(config, clip)
     if not lesson.samples:
         parser.exit(1, 'the tracker stored no sample\n')

@@ -35,7 +35,7 @@ import numpy as np
 
 from benchmarks.footprint import measure_footprint
 from benchmarks.measurement import (
-    CLOCKS, load_config, markdown_table, positive, PROCESSOR, take_turns, WALL)
+    CLOCKS, markdown_table, named_config, positive, PROCESSOR, take_turns, WALL)
 from benchmarks.scenes import Clip, moving_scene
 from benchmarks.stages import instrumented, Stage, StageClock, STAGES, TRAINING
 from lmsco_ros.core import LMSCOTracker, TrackerConfig, TrackState
@@ -298,7 +298,7 @@ def main(arguments: list[str] | None = None) -> None:
                         help='all unless given')
     options = parser.parse_args(arguments)
     options.output.mkdir(parents=True, exist_ok=True)
-    config = load_config(options.config)
+    config = named_config(options.config)
     print(f'# `{options.config}`, {options.frames} updates of each point')
     for name in options.curve or (*CURVES, 'footprint'):
         if name == 'footprint':

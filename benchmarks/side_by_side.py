@@ -36,7 +36,7 @@ import cv2
 import numpy as np
 
 from benchmarks.measurement import (
-    load_config, markdown_table, positive, PROCESSOR, take_turns, WALL)
+    markdown_table, named_config, positive, PROCESSOR, take_turns, WALL)
 from benchmarks.scenes import Clip, recorded_clips, walking_scene
 from lmsco_ros.core import LMSCOError, TrackState
 from lmsco_ros.core.backend import limit_threads
@@ -85,7 +85,7 @@ def build_tracker(name: str) -> Tracker:
     """
     if Path(name).suffix in ('.yaml', '.yml'):
         try:
-            return ConfiguredTracker(load_config(name))
+            return ConfiguredTracker(named_config(name))
         except LMSCOError as error:
             raise TrackerError(f'{name} cannot be built: {error}') from error
     return resolve(name).build()

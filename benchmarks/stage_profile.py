@@ -26,7 +26,7 @@ from __future__ import annotations
 
 import argparse
 
-from benchmarks.measurement import CLOCKS, load_config, positive
+from benchmarks.measurement import CLOCKS, named_config, positive
 from benchmarks.profiling import floor_table, profile_track, stage_table
 from benchmarks.scenes import walking_scene
 
@@ -40,7 +40,7 @@ def main(arguments: list[str] | None = None) -> None:
     parser.add_argument('--threads', type=positive, default=1)
     parser.add_argument('--clock', choices=CLOCKS, default='processor')
     options = parser.parse_args(arguments)
-    config = load_config(options.config)
+    config = named_config(options.config)
     clip = walking_scene(options.frames + 1)
     profiles = [profile_track(config, clip, options.clock, options.threads)
                 for _ in range(options.repetitions)]

@@ -18,3 +18,6 @@ ROS messages and plain values, each way, as pure functions.
 Nothing here knows a tracker or needs a running node: arrays, tuples and small frozen
 values go in, messages come out, and back.
 """
+
+# Tells this package from others of the same, general name.
+PART_OF = 'lmsco_ros'

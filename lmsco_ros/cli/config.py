@@ -18,7 +18,7 @@ from __future__ import annotations
 
 import typer
 
-from lmsco_ros.cli.configuration import load_config
+from lmsco_ros.cli.configuration import requested_config
 from lmsco_ros.cli.console import plain_errors, say
 from lmsco_ros.cli.options import ConfigOption, PresetOption
 
@@ -33,4 +33,4 @@ def register(app: typer.Typer) -> None:
 def show(preset: PresetOption = 'default', config: ConfigOption = None) -> None:
     """Show a configuration as YAML: a file to begin with, or what a file of yours means."""
     with plain_errors():
-        say(load_config(preset, config).to_yaml().rstrip())
+        say(requested_config(preset, config).to_yaml().rstrip())

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from lmsco_ros.core import TrackerConfig
 
 
-def load_config(preset: str, path: Path | None = None) -> TrackerConfig:
+def requested_config(preset: str, path: Path | None = None) -> TrackerConfig:
     """
     Return the configuration in `path`, or without one the preset.
 
@@ -39,5 +39,5 @@ def load_config(preset: str, path: Path | None = None) -> TrackerConfig:
 
 
 def node_parameters(preset: str, path: Path | None = None) -> dict[str, str]:
-    """Return the parameters that tell the node to use the configuration of `load_config`."""
+    """Return the parameters that tell the node to use the configuration of `requested_config`."""
     return {'preset': preset, 'tracker_config': str(path.resolve()) if path else ''}

@@ -23,7 +23,7 @@ from typing import Annotated, TYPE_CHECKING
 from rich.progress import Progress
 import typer
 
-from lmsco_ros.cli.configuration import load_config, node_parameters
+from lmsco_ros.cli.configuration import node_parameters, requested_config
 from lmsco_ros.cli.console import (
     fail, FAILED, frame_progress, plain_errors, say_where, show_pairs, telling_what_is_kept)
 from lmsco_ros.cli.options import ConfigOption, PresetOption
@@ -60,7 +60,7 @@ def demo(
     """Render a thermal scene, track in it with the node, and compare with the truth."""
     with plain_errors():
         require_ros()
-        load_config(preset, config)
+        requested_config(preset, config)
         from lmsco_ros.replay.run_outputs import RunOutputs
         from lmsco_ros.synthetic import SceneConfig
 
@@ -88,7 +88,7 @@ def _render(plot: SceneConfig, progress: Progress) -> list[SceneFrame]:
 def _track(scene: Sequence[SceneFrame], parameters: dict[str, str], outputs: RunOutputs,
            progress: Progress) -> list[TrackedFrame]:
     """Run the node; rows are written as it answers, pictures when it has nothing to do."""
-    from lmsco_ros.replay.frame import Frame
+    from lmsco_ros.replay.frame import RecordedFrame
     from lmsco_ros.replay.scene_run import SceneRun
 
     def write_row(item: TrackedFrame) -> None:
@@ -102,8 +102,8 @@ def _track(scene: Sequence[SceneFrame], parameters: dict[str, str], outputs: Run
         tracked = run.tracked()
         for item in progress.track(tracked, description='writing'):
             frame = item.frame
-            outputs.add_picture(Frame(frame.index, frame.stamp_ns, frame.image), item.result,
-                                frame.box)
+            outputs.add_picture(RecordedFrame(frame.index, frame.stamp_ns, frame.image),
+                                item.result, frame.box)
     return tracked
 
 

@@ -21,7 +21,7 @@ from typing import Annotated
 
 import typer
 
-from lmsco_ros.cli.configuration import load_config, node_parameters
+from lmsco_ros.cli.configuration import node_parameters, requested_config
 from lmsco_ros.cli.console import (
     frame_progress, plain_errors, say, telling_what_is_kept, warn)
 from lmsco_ros.cli.options import (
@@ -55,7 +55,7 @@ def replay(
     """Play a bag through the node and record its answers beside the messages of the bag."""
     with plain_errors():
         require_ros()
-        load_config(preset, config)
+        requested_config(preset, config)
         from lmsco_ros.core import BoundingBox
         from lmsco_ros.replay.bag_replay import Replay, ReplayPlan
 

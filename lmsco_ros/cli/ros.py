@@ -17,11 +17,11 @@
 from __future__ import annotations
 
 from lmsco_ros.cli.console import fail, FAILED
-from lmsco_ros.node.installation import without_ros
+from lmsco_ros.node.installation import obstacle
 
 
 def require_ros() -> None:
-    """Leave with the remedy when there is no ROS 2 to run the node with."""
-    remedy = without_ros()
+    """Leave with the remedy when the node cannot run here."""
+    remedy = obstacle()
     if remedy:
         fail(remedy, FAILED)

@@ -24,7 +24,7 @@ from typing import Annotated, TYPE_CHECKING
 
 import typer
 
-from lmsco_ros.cli.configuration import load_config
+from lmsco_ros.cli.configuration import requested_config
 from lmsco_ros.cli.console import (
     fail, FAILED, frame_progress, MISUSED, plain_errors, say, say_where, telling_what_is_kept,
     warn)
@@ -33,7 +33,7 @@ from lmsco_ros.cli.options import (
 
 if TYPE_CHECKING:
     from lmsco_ros.core import BoundingBox, LMSCOTracker, TrackResult
-    from lmsco_ros.replay.frame import Frame
+    from lmsco_ros.replay.frame import RecordedFrame
     from lmsco_ros.replay.run_outputs import RunOutputs
     from lmsco_ros.replay.sources import Source
 
@@ -71,7 +71,7 @@ def track(
         from lmsco_ros.replay.run_outputs import RunOutputs
         from lmsco_ros.replay.sources import open_source
 
-        settings = load_config(preset, config)
+        settings = requested_config(preset, config)
         images = open_source(source, topic=topic)
         truth = _read_truth(ground_truth, len(images))
         start = _start_box(init, truth)
@@ -134,7 +134,7 @@ def _run(tracker: LMSCOTracker, images: Source, start: BoundingBox,
         say(f'mean overlap {sum(overlaps) / len(overlaps):.3f} over {len(overlaps)} frames')
 
 
-def _tell_start(start: BoundingBox, frame: Frame) -> None:
+def _tell_start(start: BoundingBox, frame: RecordedFrame) -> None:
     """Say when a part of the target cannot be seen."""
     height, width = frame.image.shape[:2]
     x, y, across, down = start.as_tuple()
@@ -143,8 +143,8 @@ def _tell_start(start: BoundingBox, frame: Frame) -> None:
              f'{width} x {height} pixels; only the part inside is seen')
 
 
-def _results(tracker: LMSCOTracker, frames: Iterator[Frame], start: BoundingBox,
-             ) -> Iterator[tuple[Frame, TrackResult, float]]:
+def _results(tracker: LMSCOTracker, frames: Iterator[RecordedFrame], start: BoundingBox,
+             ) -> Iterator[tuple[RecordedFrame, TrackResult, float]]:
     """Yield each frame with what the tracker says and the seconds it took."""
     for frame in frames:
         began = time.perf_counter()

@@ -28,10 +28,10 @@ from lmsco_ros.evaluation.errors import SequenceError
 from lmsco_ros.evaluation.geometry import is_absent, overlaps
 from lmsco_ros.evaluation.protocols.supervised import RESTART_GAP
 from lmsco_ros.evaluation.trace import Trace
-from lmsco_ros.evaluation.trackers.interface import Answer, Tracker
+from lmsco_ros.evaluation.trackers.interface import Answer, EvaluatedTracker
 
 
-def run_one_pass(tracker: Tracker, sequence: TrackingSequence) -> Trace:
+def run_one_pass(tracker: EvaluatedTracker, sequence: TrackingSequence) -> Trace:
     """
     Start on the first frame with a target and track to the end.
 
@@ -50,7 +50,7 @@ def run_one_pass(tracker: Tracker, sequence: TrackingSequence) -> Trace:
     return recorder.trace(failures=())
 
 
-def run_supervised(tracker: Tracker, sequence: TrackingSequence) -> Trace:
+def run_supervised(tracker: EvaluatedTracker, sequence: TrackingSequence) -> Trace:
     """
     Track to the end, with a new start five frames after each frame without overlap.
 
@@ -69,7 +69,7 @@ def run_supervised(tracker: Tracker, sequence: TrackingSequence) -> Trace:
     return recorder.trace(failures=tuple(failures))
 
 
-PROTOCOLS: Mapping[str, Callable[[Tracker, TrackingSequence], Trace]] = {
+PROTOCOLS: Mapping[str, Callable[[EvaluatedTracker, TrackingSequence], Trace]] = {
     'ope': run_one_pass,
     'vot': run_supervised,
 }
@@ -92,7 +92,7 @@ def _next_start(sequence: TrackingSequence, index: int) -> int | None:
 class _Recorder:
     """Drives the tracker and writes down answers and times."""
 
-    def __init__(self, tracker: Tracker, sequence: TrackingSequence) -> None:
+    def __init__(self, tracker: EvaluatedTracker, sequence: TrackingSequence) -> None:
         self._tracker = tracker
         self._sequence = sequence
         self.frames = len(sequence)

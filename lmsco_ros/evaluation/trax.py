@@ -44,7 +44,7 @@ from lmsco_ros.extras import MissingExtraError, require_extra
 from lmsco_ros.media.false_color import without_false_color
 
 
-class Tracker(Protocol):
+class ServedTracker(Protocol):
     """What the server asks of a tracker; `LMSCOTracker` is one."""
 
     def initialize(self, image: npt.NDArray[Any], box: BoundingBox) -> TrackResult:
@@ -130,7 +130,7 @@ def read_box(objects: Sequence[tuple[Any, Any]] | None) -> BoundingBox:
     return BoundingBox(*objects[0][0].bounds())
 
 
-def answer(request: Any, tracker: Tracker, channel: str) -> TrackResult:
+def answer(request: Any, tracker: ServedTracker, channel: str) -> TrackResult:
     """Give one TraX request (`trax.server.Request`) to the tracker."""
     image = read_image(request.image[channel])
     if request.type == 'initialize':
@@ -138,7 +138,7 @@ def answer(request: Any, tracker: Tracker, channel: str) -> TrackResult:
     return tracker.update(image)
 
 
-def serve(handle: Any, make_tracker: Callable[[], Tracker], channel: str,
+def serve(handle: Any, make_tracker: Callable[[], ServedTracker], channel: str,
           make_region: Callable[[float, float, float, float], Any]) -> None:
     """
     Answer a TraX client until it quits.
@@ -184,7 +184,7 @@ def _reason(error: Exception) -> str:
     return text.encode('ascii', 'backslashreplace').decode('ascii')
 
 
-def load_config(preset: str, path: Path | None) -> TrackerConfig:
+def served_config(preset: str, path: Path | None) -> TrackerConfig:
     """Return the configuration in the YAML file `path` if there is one, else the preset."""
     return TrackerConfig.from_yaml(path) if path else TrackerConfig.preset(preset)
 
@@ -227,8 +227,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         [trax.Region.RECTANGLE], [trax.Image.PATH, trax.Image.MEMORY, trax.Image.BUFFER],
         [options.channel], 'lmsco', 'Large margin structured convolution operator', 'correlation')
 
-    def make_tracker() -> Tracker:
-        return LMSCOTracker(load_config(options.preset, options.config))
+    def make_tracker() -> ServedTracker:
+        return LMSCOTracker(served_config(options.preset, options.config))
 
     try:
         serve(handle, make_tracker, options.channel, trax.Rectangle.create)

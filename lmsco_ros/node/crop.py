@@ -43,7 +43,7 @@ class Crop:
     right: int = 0
     bottom: int = 0
 
-    def cut(self, image: npt.NDArray) -> npt.NDArray:
+    def trim(self, image: npt.NDArray) -> npt.NDArray:
         """
         Return a view of what remains of the image.
 

@@ -170,7 +170,7 @@ class GuardedNode(LifecycleNode):
             machine.trigger_transition_by_label('transition_error', False)
         state_id, label = machine.current_state
         if state_id == State.TRANSITION_STATE_ERRORPROCESSING:
-            result = self.on_error(LifecycleState(label=label, state_id=state_id))
+            result: Any = self.on_error(LifecycleState(label=label, state_id=state_id))
             machine.trigger_transition_by_label(result.to_label(), False)
 
 

@@ -39,7 +39,7 @@ from lmsco_ros.node.guarded_node import GuardedNode
 from lmsco_ros.node.history import NANOSECONDS
 from lmsco_ros.node.image_sources import (image_sources, other_image_topics, stale_message,
                                           unheard_warning)
-from lmsco_ros.node.outcome import Frame
+from lmsco_ros.node.outcome import PendingFrame
 from lmsco_ros.node.parameters import Settings
 from lmsco_ros.node.received import ReceivedImage, WhileThereIsRoom
 from lmsco_ros.node.worker import TrackerWorker
@@ -159,8 +159,8 @@ class Inputs:
             self._node.get_logger().warning(
                 'the stamps of the images went backwards; earlier images are forgotten, '
                 'tracking goes on', throttle_duration_sec=5.0)
-        self._worker.submit(Frame(ReceivedImage(serialized, kind, decode, self._crop), stamp,
-                                  received, header))
+        image = ReceivedImage(serialized, kind, decode, self._crop)
+        self._worker.submit(PendingFrame(image, stamp, received, header))
 
     def _on_region(self, region: RegionOfInterest) -> None:
         self._start(Header(), region, box_from_region, None)

@@ -107,8 +107,8 @@ def _serve(arguments: Sequence[str], ending: Ending) -> int:
     own, ros = split_arguments(arguments)
     if own:
         return _answer(own)
-    from lmsco_ros.node.installation import without_ros
-    remedy = without_ros()
+    from lmsco_ros.node.installation import obstacle
+    remedy = obstacle()
     if remedy:
         return _fail(remedy)
     try:

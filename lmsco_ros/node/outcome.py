@@ -59,7 +59,7 @@ class Picture(Protocol):
 
 
 @dataclass(frozen=True, eq=False)
-class Frame:
+class PendingFrame:
     """
     One image on its way to the tracker.
 
@@ -104,7 +104,7 @@ class Outcome:
 
     Attributes
     ----------
-    frame : Frame
+    frame : PendingFrame
     phase : Phase
         TRACKED (there is a result), IDLE (no target), DISABLED, REFUSED (a request or a
         frame could not be used; nothing changed) or FAILED (the tracker raised; the target is
@@ -125,7 +125,7 @@ class Outcome:
 
     """
 
-    frame: Frame
+    frame: PendingFrame
     phase: Phase
     result: TrackResult | None
     track_id: int

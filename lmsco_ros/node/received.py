@@ -82,7 +82,7 @@ class ReceivedImage:
         np.empty(_COPIES * self.nbytes, np.uint8)
         message = deserialize_message(self.serialized, self.kind)
         try:
-            return self.crop.cut(self.decode(message))
+            return self.crop.trim(self.decode(message))
         except MessageError as error:
             raise ImageError(str(error)) from error
 

@@ -19,7 +19,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from lmsco_ros.core.types import BoundingBox
-from lmsco_ros.node.outcome import Frame
+from lmsco_ros.node.outcome import PendingFrame
 
 
 @dataclass(frozen=True)
@@ -38,11 +38,11 @@ class Request:
     stamp: int | None
     made: float
 
-    def wants(self, frame: Frame) -> bool:
+    def wants(self, frame: PendingFrame) -> bool:
         """Tell whether the frame is the one to start on."""
         return self.stamp is None or frame.stamp == self.stamp
 
-    def has_missed(self, frame: Frame, patience: float) -> bool:
+    def has_missed(self, frame: PendingFrame, patience: float) -> bool:
         """Tell from a later frame whether the one to start on will not come any more."""
         return self.stamp is not None and (
             frame.stamp > self.stamp or frame.received - self.made > patience)
@@ -52,7 +52,7 @@ class Request:
 class Step:
     """A frame to follow the target in; not live when it is gone through late."""
 
-    frame: Frame
+    frame: PendingFrame
     orders: Orders
     live: bool = True
 
@@ -61,7 +61,7 @@ class Step:
 class Start:
     """A frame to start on; live when it has just come and is answered by that."""
 
-    frame: Frame
+    frame: PendingFrame
     orders: Orders
     request: Request
     live: bool = False
@@ -71,7 +71,7 @@ class Start:
 class Refuse:
     """A request that cannot be met, told with the frame that showed it."""
 
-    frame: Frame
+    frame: PendingFrame
     orders: Orders
     reason: str
     live: bool = False

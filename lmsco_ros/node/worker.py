@@ -33,7 +33,7 @@ from lmsco_ros.core.errors import LMSCOError
 from lmsco_ros.core.types import BoundingBox, TrackResult
 from lmsco_ros.node.history import FrameHistory, NANOSECONDS
 from lmsco_ros.node.mailbox import Mailbox
-from lmsco_ros.node.outcome import Frame, Outcome, Phase, Tracker
+from lmsco_ros.node.outcome import Outcome, PendingFrame, Phase, Tracker
 from lmsco_ros.node.work import (answers_no_frame, is_late_step, is_live_start, Item, Orders,
                                  Refuse, Request, Start, Step)
 
@@ -63,7 +63,7 @@ class TrackerWorker:
     """
 
     def __init__(self, tracker: Tracker, deliver: Callable[[Outcome], None], *,
-                 mailbox: Mailbox[Item], history: FrameHistory[Frame],
+                 mailbox: Mailbox[Item], history: FrameHistory[PendingFrame],
                  on_fault: Callable[[str, BaseException], object]) -> None:
         self._tracker = tracker
         self._deliver = deliver
@@ -132,7 +132,7 @@ class TrackerWorker:
             self._thread.join(timeout)
         return not self._thread.is_alive()
 
-    def submit(self, frame: Frame) -> None:
+    def submit(self, frame: PendingFrame) -> None:
         """Hand over the next frame."""
         with self._intake:
             self._history.add(frame)
@@ -204,7 +204,7 @@ class TrackerWorker:
         self._extra_steps = 0
         self._dropped += self._mailbox.supersede(answers_no_frame, is_live_start)
 
-    def _may_follow(self, frame: Frame) -> bool:
+    def _may_follow(self, frame: PendingFrame) -> bool:
         """Tell whether a start in the past that catches up goes through this frame, too."""
         follows = (self._extra_steps > 0 and self._extra_bytes >= frame.nbytes
                    and self._mailbox.skips_behind(is_late_step))
@@ -304,7 +304,7 @@ class TrackerWorker:
                                   finished if started is None else started, finished, image))
 
 
-def _unknown_stamp(stamp: int | None, history: FrameHistory[Frame]) -> str:
+def _unknown_stamp(stamp: int | None, history: FrameHistory[PendingFrame]) -> str:
     """Say why a start on a certain frame cannot be met."""
     assert stamp is not None, 'a start without a stamp takes the newest frame'
     first, last = history.first.stamp / NANOSECONDS, history.last.stamp / NANOSECONDS

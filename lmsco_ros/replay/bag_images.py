@@ -27,7 +27,7 @@ from lmsco_ros.replay.bags.channel import Channel
 from lmsco_ros.replay.bags.reader import BagReader, open_bag
 from lmsco_ros.replay.bags.stamps import header_stamp, ImageStamps
 from lmsco_ros.replay.errors import SourceError, SourceWarning
-from lmsco_ros.replay.frame import Frame
+from lmsco_ros.replay.frame import RecordedFrame
 
 RAW, COMPRESSED = 'sensor_msgs/msg/Image', 'sensor_msgs/msg/CompressedImage'
 _DEFAULT_FPS = 30.0
@@ -158,7 +158,7 @@ class BagImages:
         """Return the number of messages on the topic."""
         return self._length
 
-    def __iter__(self) -> Iterator[Frame]:
+    def __iter__(self) -> Iterator[RecordedFrame]:
         """
         Yield the frames with the stamps of `ImageStamps`, numbered by their messages.
 
@@ -180,7 +180,7 @@ class BagImages:
                 except ValueError as error:
                     skipped.add(index, error)
                     continue
-                yield Frame(index, stamps.take(header, logged), image)
+                yield RecordedFrame(index, stamps.take(header, logged), image)
         skipped.finish(len(images))
 
 

@@ -29,21 +29,21 @@ from lmsco_ros.replay.bag_images import RAW
 from lmsco_ros.replay.bags.output import BagOutput
 from lmsco_ros.replay.bags.stamps import END_OF_TIME
 from lmsco_ros.replay.errors import OutputError
-from lmsco_ros.replay.frame import Frame
+from lmsco_ros.replay.frame import RecordedFrame
 from lmsco_ros.replay.storage import Storage
 
 _ENCODINGS = {(np.dtype(np.uint8), 2): 'mono8', (np.dtype(np.uint16), 2): 'mono16',
               (np.dtype(np.float32), 2): '32FC1', (np.dtype(np.uint8), 3): 'bgr8'}
 
 
-def make_bag(frames: Iterable[Frame], path: Path, *, topic: str, frame_id: str,
+def make_bag(frames: Iterable[RecordedFrame], path: Path, *, topic: str, frame_id: str,
              storage: Storage, start_ns: int) -> int:
     """
     Write frames into a new bag and return how many there were; see `write_frames`.
 
     Parameters
     ----------
-    frames : iterable of Frame
+    frames : iterable of RecordedFrame
         8 bit becomes mono8 or bgr8, 16 bit mono16, float 32FC1.
     path : Path
         The bag's folder; it must not exist.
@@ -64,7 +64,7 @@ def make_bag(frames: Iterable[Frame], path: Path, *, topic: str, frame_id: str,
                         start_ns=start_ns)
 
 
-def write_frames(frames: Iterable[Frame], output: BagOutput, *, topic: str, frame_id: str,
+def write_frames(frames: Iterable[RecordedFrame], output: BagOutput, *, topic: str, frame_id: str,
                  start_ns: int) -> int:
     """
     Write frames as sensor_msgs/Image into a bag and return how many there were.
@@ -73,7 +73,7 @@ def write_frames(frames: Iterable[Frame], output: BagOutput, *, topic: str, fram
 
     Parameters
     ----------
-    frames : iterable of Frame
+    frames : iterable of RecordedFrame
         8 bit becomes mono8 or bgr8, 16 bit mono16, float 32FC1.
     output : BagOutput
         The bag, not opened yet.

@@ -20,7 +20,7 @@ import numpy.typing as npt
 
 
 @dataclass(frozen=True, eq=False)
-class Frame:
+class RecordedFrame:
     """
     One image of a recording.
 

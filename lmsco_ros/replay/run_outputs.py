@@ -24,7 +24,7 @@ from types import TracebackType
 
 from lmsco_ros.core.types import BoundingBox, TrackResult
 from lmsco_ros.replay.errors import OutputError
-from lmsco_ros.replay.frame import Frame
+from lmsco_ros.replay.frame import RecordedFrame
 from lmsco_ros.replay.results_file import BoxesFile
 from lmsco_ros.visualization.contact_sheet import ContactSheet, Moment
 from lmsco_ros.visualization.overlay_video import OverlayVideo
@@ -103,7 +103,8 @@ class RunOutputs:
         files = ', '.join([f'{TABLE} with {self._boxes.rows} rows', *pictures])
         return f'kept in {self.folder}: {files}'
 
-    def add(self, frame: Frame, result: TrackResult, truth: BoundingBox | None = None) -> None:
+    def add(self, frame: RecordedFrame, result: TrackResult,
+            truth: BoundingBox | None = None) -> None:
         """Append one frame with what the tracker said and, where known, the truth."""
         self.add_row(frame.index, frame.stamp_ns, result)
         self.add_picture(frame, result, truth)
@@ -116,7 +117,7 @@ class RunOutputs:
                 self._boxes = self._open.enter_context(BoxesFile(self.folder / TABLE))
             self._boxes.add(index, stamp_ns, result)
 
-    def add_picture(self, frame: Frame, result: TrackResult,
+    def add_picture(self, frame: RecordedFrame, result: TrackResult,
                     truth: BoundingBox | None = None) -> None:
         """Show a frame, whose row is in the table, in film and summary."""
         with _told():

@@ -32,7 +32,7 @@ from lmsco_ros.media.video import VideoFile
 from lmsco_ros.replay.bag_images import BagImages
 from lmsco_ros.replay.bags.files import is_bag
 from lmsco_ros.replay.errors import SourceError
-from lmsco_ros.replay.frame import Frame
+from lmsco_ros.replay.frame import RecordedFrame
 
 _DEFAULT_FPS = 30.0
 
@@ -47,7 +47,7 @@ class Source(Protocol):
     def __len__(self) -> int:
         """Return the number of frames that the source states."""
 
-    def __iter__(self) -> Iterator[Frame]:
+    def __iter__(self) -> Iterator[RecordedFrame]:
         """Yield the frames; a damaged end is left out."""
 
 
@@ -113,7 +113,7 @@ class IndexedImages:
         """Return the number of images that the folder or container states."""
         return len(self.images)
 
-    def __iter__(self) -> Iterator[Frame]:
+    def __iter__(self) -> Iterator[RecordedFrame]:
         """Yield the frames, all gray or all in color; stamps start at 0."""
         return _frames((round(index * 1e9 / self.fps), image)
                        for index, image in enumerate(self.images))
@@ -142,7 +142,7 @@ class TimedImages:
         """Return the number of frames that the container states."""
         return len(self.film)
 
-    def __iter__(self) -> Iterator[Frame]:
+    def __iter__(self) -> Iterator[RecordedFrame]:
         """Yield the frames, all gray or all in color; stamps start at 0."""
         return _frames(self.film.timed())
 
@@ -167,13 +167,13 @@ def _images_of(path: Path) -> ImageFiles:
     return images
 
 
-def _frames(images: Iterable[tuple[int, npt.NDArray]]) -> Iterator[Frame]:
+def _frames(images: Iterable[tuple[int, npt.NDArray]]) -> Iterator[RecordedFrame]:
     """Yield stamps and images as frames with as many channels as the first has."""
     dimensions = 0
     try:
         for index, (stamp, image) in enumerate(images):
             dimensions = dimensions or image.ndim
-            yield Frame(index, stamp, _with_dimensions(image, dimensions))
+            yield RecordedFrame(index, stamp, _with_dimensions(image, dimensions))
     except MediaError as error:
         raise SourceError(str(error)) from error
 

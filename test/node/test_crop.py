@@ -32,7 +32,7 @@ CROP = {'crop_left': 3, 'crop_top': 2, 'crop_right': 5, 'crop_bottom': 4}
 @given(st.builds(Crop, EDGES, EDGES, EDGES, EDGES))
 def test_a_pixel_keeps_its_place_in_the_full_image(crop):
     image = np.arange(20 * 30).reshape(20, 30)
-    remaining = crop.cut(image)
+    remaining = crop.trim(image)
     assert np.shares_memory(remaining, image)
     assert crop.full_shape(remaining) == image.shape
     place = BoundingBox(10, 8, 1, 1)
@@ -48,7 +48,7 @@ def test_a_pixel_keeps_its_place_in_the_full_image(crop):
                                   Crop(top=7), Crop(bottom=600)])
 def test_nothing_left_is_refused(crop):
     with pytest.raises(ImageError, match='8 x 6 pixels.*lower crop_left'):
-        crop.cut(np.zeros((6, 8)))
+        crop.trim(np.zeros((6, 8)))
 
 
 def test_node_cuts_edges_and_speaks_of_the_full_image(run):

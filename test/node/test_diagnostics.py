@@ -20,7 +20,7 @@ import pytest
 
 from lmsco_ros.core.types import BoundingBox, TrackResult, TrackState
 from lmsco_ros.node.diagnostics import frame_status, HealthMonitor, Problem, refused_status
-from lmsco_ros.node.outcome import Frame, Outcome, Phase
+from lmsco_ros.node.outcome import Outcome, PendingFrame, Phase
 from msg_adapters.status import Level, Reading
 
 BOX = BoundingBox(1, 2, 3, 4)
@@ -38,7 +38,7 @@ class Clock:
 def outcome(phase=Phase.TRACKED, state=TrackState.TRACKING, *, live=True, error=''):
     result = TrackResult(BOX, 0.5, state, np.zeros((2, 2), np.float32), BOX) \
         if phase is Phase.TRACKED else None
-    frame = Frame(None, 0, 0.0)
+    frame = PendingFrame(None, 0, 0.0)
     return Outcome(frame, phase, result, 3, live, error, 0.006, 0.010)
 
 

@@ -260,6 +260,25 @@ def test_without_ros_the_remedy_is_told():
     assert all(word in done.stderr for word in ('rclpy', 'source', '`ros`'))
 
 
+@pytest.mark.parametrize('module', ['lmsco_ros.node.main', 'lmsco_ros.cli.main'])
+@pytest.mark.parametrize('place, content', [
+    ('msg_adapters.py', ''),
+    ('msg_adapters/__init__.py', 'PART_OF = "another"'),
+    ('msg_adapters/__init__.py', 'raise RuntimeError("of its own")'),
+])
+def test_foreign_package_with_the_name_of_ours_is_told(tmp_path, module, place, content):
+    (tmp_path / place).parent.mkdir(exist_ok=True)
+    (tmp_path / place).write_text(content)
+    words = ['demo', '--output', 'demo'] if 'cli' in module else []
+    # The folder that a module is run in comes before all others.
+    done = subprocess.run(
+        [sys.executable, '-m', module, *words], cwd=tmp_path, capture_output=True, text=True,
+        timeout=60, env={**os.environ, 'PYTHONPATH': str(REPOSITORY)})
+    assert done.returncode == 1 and len(done.stderr.splitlines()) == 1
+    assert f'msg_adapters in {tmp_path / place} is not that of lmsco_ros' in done.stderr
+    assert 'PYTHONPATH' in done.stderr and not (tmp_path / 'demo').exists()
+
+
 def test_library_that_cannot_be_imported_is_told(tmp_path):
     (tmp_path / 'rclpy.py').write_text('raise ImportError("librcl.so is missing\\nand more")')
     code, _, errors = command(environment={'PYTHONPATH': f'{tmp_path}:{REPOSITORY}'})

@@ -29,7 +29,7 @@ from lmsco_ros.core.errors import ImageError
 from lmsco_ros.core.types import BoundingBox, TrackResult, TrackState
 from lmsco_ros.node.history import FrameHistory
 from lmsco_ros.node.mailbox import BoundedMailbox, LatestMailbox
-from lmsco_ros.node.outcome import Frame, Phase
+from lmsco_ros.node.outcome import PendingFrame, Phase
 from lmsco_ros.node.worker import TrackerWorker
 
 REPOSITORY = Path(__file__).resolve().parents[2]
@@ -97,8 +97,8 @@ class Bench:
     def frame(self, number, received=None, error=None):
         """Submit the frame whose pixels and stamp in seconds are `number`."""
         pixels = Pixels(np.full((2, 2), number), error)
-        self.worker.submit(Frame(pixels, int(number * SECOND),
-                                 time.monotonic() if received is None else received))
+        self.worker.submit(PendingFrame(pixels, int(number * SECOND),
+                                        time.monotonic() if received is None else received))
         return pixels
 
     def wait(self, count):
@@ -146,7 +146,7 @@ def test_outcome_tells_frame_times_and_context(bench):
     b = bench()
     b.worker.initialize(BOX)
     received = time.monotonic() - 5
-    b.worker.submit(Frame(Pixels(np.zeros((2, 2))), 0, received, 'context'))
+    b.worker.submit(PendingFrame(Pixels(np.zeros((2, 2))), 0, received, 'context'))
     outcome = b.wait(1)
     assert (outcome.phase, outcome.live, outcome.track_id) == (Phase.TRACKED, True, 1)
     assert outcome.frame.context == 'context'
@@ -512,7 +512,7 @@ def test_start_that_waits_is_forgotten_by_a_reset_while_its_image_is_read(bench)
     reset = Pixels(np.zeros((2, 2)), ImageError('cut off'))
     reset.read = lambda read=reset.read: (b.worker.reset(), read())
     b.worker.initialize(BOX)
-    b.worker.submit(Frame(reset, 0, time.monotonic()))
+    b.worker.submit(PendingFrame(reset, 0, time.monotonic()))
     b.wait(1)
     b.frame(1)
     assert b.wait(2).phase is Phase.IDLE
@@ -584,7 +584,7 @@ STAMPS = st.lists(st.integers(0, 30), min_size=1, max_size=30)
 def test_history_is_ordered_and_bounded(stamps, frames, seconds):
     history = FrameHistory(seconds, frames, 10 ** 6)
     for stamp in stamps:
-        history.add(Frame(Pixels(np.zeros((1, 1))), stamp * SECOND, 0.0))
+        history.add(PendingFrame(Pixels(np.zeros((1, 1))), stamp * SECOND, 0.0))
         kept = [frame.stamp // SECOND for frame in history]
         assert kept[-1] == stamp and kept == sorted(kept)
         assert len(kept) <= frames and kept[0] >= stamp - seconds
@@ -594,7 +594,7 @@ def test_history_is_ordered_and_bounded(stamps, frames, seconds):
 def test_history_is_bounded_in_bytes_and_keeps_the_newest(sizes, nbytes):
     history = FrameHistory(100, 100, nbytes)
     for stamp, size in enumerate(sizes):
-        history.add(Frame(Pixels(np.zeros(size, np.uint8)), stamp, 0.0))
+        history.add(PendingFrame(Pixels(np.zeros(size, np.uint8)), stamp, 0.0))
         assert history.last.stamp == stamp
         assert len(history) == 1 or sum(frame.nbytes for frame in history) <= nbytes
     kept = [frame.nbytes for frame in history]
@@ -604,7 +604,7 @@ def test_history_is_bounded_in_bytes_and_keeps_the_newest(sizes, nbytes):
 
 def test_history_forgets_a_frame_with_its_bytes():
     history = FrameHistory(100, 100, 20)
-    frames = [Frame(Pixels(np.zeros(10, np.uint8)), stamp, 0.0) for stamp in range(3)]
+    frames = [PendingFrame(Pixels(np.zeros(10, np.uint8)), stamp, 0.0) for stamp in range(3)]
     for frame in frames[:2]:
         history.add(frame)
     history.discard(frames[1])
@@ -617,7 +617,7 @@ def test_history_forgets_a_frame_with_its_bytes():
 def test_history_finds_the_frame_and_all_later_ones(stamps):
     history = FrameHistory(100, 100, 10 ** 6)
     for stamp in sorted(stamps):
-        history.add(Frame(Pixels(np.zeros((1, 1))), stamp, 0.0))
+        history.add(PendingFrame(Pixels(np.zeros((1, 1))), stamp, 0.0))
     for stamp in range(32):
         expected = [s for s in sorted(stamps) if s >= stamp] if stamp in stamps else []
         assert [frame.stamp for frame in history.since(stamp)] == expected

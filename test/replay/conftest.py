@@ -21,7 +21,7 @@ from rosbags.rosbag2 import CompressionFormat, StoragePlugin, Writer
 from rosbags.typesys import get_typestore, Stores
 
 from lmsco_ros.replay.bag_maker import image_message
-from lmsco_ros.replay.frame import Frame
+from lmsco_ros.replay.frame import RecordedFrame
 from lmsco_ros.replay.storage import Storage
 
 
@@ -34,7 +34,7 @@ def counts(index, shape=(48, 64), dtype=np.uint16):
 @pytest.fixture
 def frames():
     """Return ten 16-bit frames at 25 Hz."""
-    return [Frame(i, i * 40_000_000, counts(i)) for i in range(10)]
+    return [RecordedFrame(i, i * 40_000_000, counts(i)) for i in range(10)]
 
 
 @pytest.fixture

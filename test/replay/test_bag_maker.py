@@ -21,7 +21,7 @@ from rosbags.typesys import get_typestore, Stores
 
 from lmsco_ros.replay.bag_maker import make_bag
 from lmsco_ros.replay.errors import OutputError, SourceError
-from lmsco_ros.replay.frame import Frame
+from lmsco_ros.replay.frame import RecordedFrame
 from lmsco_ros.replay.storage import Storage
 
 START = 1_700_000_000_000_000_000
@@ -33,7 +33,7 @@ START = 1_700_000_000_000_000_000
     (np.uint8, (5, 7, 3), 'bgr8')])
 def test_messages(tmp_path, storage, dtype, shape, encoding):
     images = [np.random.default_rng(i).integers(0, 255, shape).astype(dtype) for i in range(3)]
-    frames = [Frame(i, i * 100, image) for i, image in enumerate(images)]
+    frames = [RecordedFrame(i, i * 100, image) for i, image in enumerate(images)]
     path = tmp_path / 'new' / 'bag'
     assert make_bag(frames, path, topic='a/b', frame_id='camera', storage=storage,
                     start_ns=START) == 3
@@ -53,7 +53,7 @@ def test_messages(tmp_path, storage, dtype, shape, encoding):
 
 def test_rows_that_are_not_contiguous(tmp_path):
     image = np.arange(48, dtype=np.uint16).reshape(6, 8)[:, ::2]
-    make_bag([Frame(0, 1, image)], tmp_path / 'bag', topic='i', frame_id='',
+    make_bag([RecordedFrame(0, 1, image)], tmp_path / 'bag', topic='i', frame_id='',
              storage=Storage.MCAP, start_ns=0)
     with AnyReader([tmp_path / 'bag'],
                    default_typestore=get_typestore(Stores.ROS2_JAZZY)) as reader:
@@ -78,12 +78,12 @@ def test_frames_before_the_source_breaks_off_are_kept(tmp_path, frames, error):
 @pytest.mark.parametrize('stamp', [-1, 2 ** 31 * 10 ** 9])
 def test_stamp_that_no_message_holds(tmp_path, stamp):
     with pytest.raises(OutputError, match='no message holds the stamp'):
-        make_bag([Frame(0, stamp, np.zeros((4, 4), np.uint8))], tmp_path / 'bag', topic='i',
-                 frame_id='', storage=Storage.MCAP, start_ns=0)
+        make_bag([RecordedFrame(0, stamp, np.zeros((4, 4), np.uint8))], tmp_path / 'bag',
+                 topic='i', frame_id='', storage=Storage.MCAP, start_ns=0)
     assert not list(tmp_path.iterdir())
 
 
 def test_image_without_an_encoding(tmp_path):
     with pytest.raises(OutputError, match='float64'):
-        make_bag([Frame(0, 1, np.zeros((4, 4)))], tmp_path / 'bag', topic='i', frame_id='',
+        make_bag([RecordedFrame(0, 1, np.zeros((4, 4)))], tmp_path / 'bag', topic='i', frame_id='',
                  storage=Storage.MCAP, start_ns=0)

@@ -14,7 +14,7 @@
 
 """Every tracker that can be evaluated, behind one small interface."""
 
-from lmsco_ros.evaluation.trackers.interface import Answer, Tracker, TrackerSpec
+from lmsco_ros.evaluation.trackers.interface import Answer, EvaluatedTracker, TrackerSpec
 from lmsco_ros.evaluation.trackers.registry import available_names, resolve
 
-__all__ = ['Answer', 'Tracker', 'TrackerSpec', 'available_names', 'resolve']
+__all__ = ['Answer', 'EvaluatedTracker', 'TrackerSpec', 'available_names', 'resolve']

@@ -43,7 +43,7 @@ class Answer(NamedTuple):
     state: TrackState
 
 
-class Tracker(Protocol):
+class EvaluatedTracker(Protocol):
     """
     A tracker of one target.
 
@@ -77,5 +77,5 @@ class TrackerSpec(Protocol):
     def identity(self) -> str:
         """Text that changes whenever settings or code of the tracker change."""
 
-    def build(self) -> Tracker:
+    def build(self) -> EvaluatedTracker:
         """Return a new tracker; raise `TrackerError` where that is impossible here."""

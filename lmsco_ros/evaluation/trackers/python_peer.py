@@ -23,18 +23,18 @@ from typing import Any
 
 from lmsco_ros.evaluation.errors import TrackerError
 from lmsco_ros.evaluation.trackers.code_version import sources_digest
-from lmsco_ros.evaluation.trackers.interface import Tracker
+from lmsco_ros.evaluation.trackers.interface import EvaluatedTracker
 
 _METHODS = ('initialize', 'update', 'close')
 _EXPECTED = ('a class, or a function without arguments, whose result has initialize(image, box), '
              'update(image), close() and in_process, as in '
-             'lmsco_ros.evaluation.trackers.Tracker')
+             'lmsco_ros.evaluation.trackers.EvaluatedTracker')
 
 
 @dataclass(frozen=True)
 class PythonSpec:
     """
-    A Python class, or function, that returns a `Tracker` when called without arguments.
+    A Python class, or function, that returns an `EvaluatedTracker` when called.
 
     Attributes
     ----------
@@ -58,7 +58,7 @@ class PythonSpec:
         digest = sources_digest((Path(source),)) if source else ''
         return f'{self.module}:{self.factory} {digest}'
 
-    def build(self) -> Tracker:
+    def build(self) -> EvaluatedTracker:
         """Import and call the factory, or raise `TrackerError` saying what it lacks."""
         tracker = self._made()
         missing = [name for name in _METHODS if not callable(getattr(tracker, name, None))]
