@@ -70,7 +70,7 @@ def mutations(source: str) -> list[Mutation]:
     for node, put in _places(tree):
         before = ast.unparse(node)
         for other in _alternatives(node):
-            put(ast.copy_location(other, node))
+            put(other)
             found.append(Mutation(node.lineno, before, ast.unparse(other), ast.unparse(tree)))
         put(node)
     return sorted(found, key=lambda mutation: mutation.line)

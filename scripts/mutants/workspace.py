@@ -120,4 +120,6 @@ def _run_tests(folder: str, tests: tuple[str, ...]) -> None:
     sys.dont_write_bytecode = False
     import pytest
 
-    os._exit(pytest.main(['-x', '-q', '-p', 'no:cacheprovider', *tests]))
+    # The search for unraisable exceptions at the end takes as long as many a test.
+    os._exit(pytest.main(['-x', '-q', '-p', 'no:cacheprovider', '-p', 'no:unraisableexception',
+                          *tests]))
