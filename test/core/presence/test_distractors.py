@@ -126,6 +126,13 @@ def test_move_by_the_side_of_the_target_is_a_jump(distractors, scenery, jump, as
     assert scenery.asked == asked
 
 
+def test_step_away_from_the_kept_place_is_no_jump(distractors, scenery):
+    """The target has come a long way since the frame was kept."""
+    moved = BOX.moved_to((100.0, 160.0))
+    assert not distractors.explain((115.0, 160.0), moved, scenery.resembles)
+    assert scenery.asked == 0
+
+
 @pytest.mark.parametrize('distance, asked', [(19.9, 0), (20.0, 1)])
 def test_place_of_the_target_itself_in_the_kept_frame_says_nothing(
         distractors, scenery, distance, asked):
