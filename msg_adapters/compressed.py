@@ -29,7 +29,7 @@ from msg_adapters.errors import ImageMessageError
 from msg_adapters.image import byte_array
 from msg_adapters.image_file import ImageFile
 from msg_adapters.jpeg_file import JPEG_START, read_jpeg
-from msg_adapters.png_file import PNG_START, read_png
+from msg_adapters.png_file import check_unfolding, PNG_START, read_png
 
 if TYPE_CHECKING:
     from sensor_msgs.msg import CompressedImage
@@ -139,7 +139,8 @@ def compressed_from_image(image: npt.NDArray, *, codec: str = 'png',
 
 def _decode(data: memoryview, limits: DecodingLimits) -> npt.NDArray:
     """Return the pixels of a jpeg or png file whose cost is within the limits."""
-    if data[:len(PNG_START)] == PNG_START:
+    is_png = data[:len(PNG_START)] == PNG_START
+    if is_png:
         file = read_png(data)
     elif data[:len(JPEG_START)] == JPEG_START:
         file = read_jpeg(data)
@@ -147,6 +148,8 @@ def _decode(data: memoryview, limits: DecodingLimits) -> npt.NDArray:
         raise ImageMessageError(
             'is neither jpeg nor png; publish one of these, or use the raw image topic')
     _check_cost(file, len(data), limits)
+    if is_png:
+        check_unfolding(file)
     try:
         pixels = cv2.imdecode(np.frombuffer(file.data, np.uint8), cv2.IMREAD_UNCHANGED)
     except cv2.error as error:

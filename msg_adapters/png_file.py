@@ -16,12 +16,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 import struct
+import zlib
 
 from msg_adapters.errors import ImageMessageError
 from msg_adapters.image_file import ImageFile
 
-__all__ = ['PNG_START', 'read_png']
+__all__ = ['check_unfolding', 'PNG_START', 'read_png']
 
 PNG_START = b'\x89PNG\r\n\x1a\n'
 
@@ -34,6 +36,9 @@ _DEPTHS = {_GRAY: (1, 2, 4, 8, 16), _COLOR: (8, 16), _PALETTE: (1, 2, 4, 8),
 _CHANNELS = {_GRAY: 1, _COLOR: 3, _PALETTE: 3, _GRAY_ALPHA: 4, _COLOR_ALPHA: 4}
 # Some decoders take time and memory for every row, however short it is.
 _LONGEST_SIDE = 2 ** 16 - 1
+# Deflate packs no tighter than this, and less than so many bytes unfold within a second.
+_TIGHTEST, _HARMLESS_BYTES = 1032, 2 ** 29
+_PIECE_BYTES = 2 ** 18
 _REMEDY = 'expected a whole png file: check the driver and the transport'
 
 
@@ -73,6 +78,48 @@ def read_png(data: memoryview) -> ImageFile:
             width, height, pixel_bytes, gray = head
             return ImageFile(width, height, pixel_bytes, gray, 1, b''.join(kept))
     raise ImageMessageError(f'has more than {_MOST_CHUNKS} chunks; {_REMEDY}')
+
+
+def check_unfolding(file: ImageFile) -> None:
+    """
+    Refuse a png whose packed pixels would unfold to far more than its pixels.
+
+    The decoder unfolds them to the end, whatever the size of the image. Files too short to take
+    long are not looked at.
+
+    Parameters
+    ----------
+    file : ImageFile
+        As `read_png` returns it, of a size that may be decoded.
+
+    Raises
+    ------
+    ImageMessageError
+        When there is more than the rows of the image.
+
+    """
+    if len(file.data) * _TIGHTEST <= _HARMLESS_BYTES:
+        return
+    # Each row, of each pass of an interlaced one, begins with a byte and may end in a broken one.
+    most = file.width * file.height * file.pixel_bytes + 4 * file.height + 28
+    if any(size > most for size in _unfolded_sizes(memoryview(file.data))):
+        raise ImageMessageError(
+            f'holds more than its {file.width} x {file.height} pixels; {_REMEDY}')
+
+
+def _unfolded_sizes(data: memoryview) -> Iterator[int]:
+    """Unfold the pixels of a png bit by bit, and tell how many bytes there are so far."""
+    unfold, size, position, kind = zlib.decompressobj(), 0, len(PNG_START), b''
+    while kind != b'IEND' and not unfold.eof:
+        kind, chunk, position = _next_chunk(data, position)
+        packed = chunk[8:-4] if kind == b'IDAT' else b''
+        while packed:
+            try:
+                size += len(unfold.decompress(packed, _PIECE_BYTES))
+            except zlib.error as error:
+                raise ImageMessageError(f'is damaged; {_REMEDY}') from error
+            yield size
+            packed = unfold.unconsumed_tail
 
 
 def _next_chunk(data: memoryview, position: int) -> tuple[bytes, memoryview, int]:

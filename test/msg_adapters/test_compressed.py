@@ -175,6 +175,29 @@ def test_long_file_of_few_pixels_is_refused(undecoded):
         _read(data, pixels=4096)
 
 
+@pytest.mark.parametrize('interlace', [0, 1])
+def test_png_that_unfolds_to_more_than_its_pixels_is_refused(interlace, undecoded):
+    data = png_file(64, 64, interlace=interlace, rows=bytes(6 * 10 ** 8))
+    with pytest.raises(ImageMessageError, match='holds more than its 64 x 64 pixels; expected'):
+        _read(data)
+
+
+def test_damage_is_told_where_a_long_png_is_unfolded(undecoded):
+    data = png_file(64, 64, before=png_chunk(b'IDAT', b'damaged' * 10 ** 5))
+    with pytest.raises(ImageMessageError, match='is damaged; expected'):
+        _read(data)
+
+
+@pytest.mark.parametrize('color, depth', [(0, 8), (0, 16), (2, 8), (4, 16), (6, 16)])
+@pytest.mark.parametrize('interlace', [False, True])
+@pytest.mark.parametrize('width, height', [(1, 1), (1, 9), (9, 1), (5, 7), (64, 48)])
+def test_png_with_just_its_pixels_passes_the_unfolding(width, height, color, depth, interlace,
+                                                       monkeypatch):
+    monkeypatch.setattr('msg_adapters.png_file._HARMLESS_BYTES', 0)
+    data = noise_png(width, height, color=color, depth=depth, interlace=interlace)
+    assert _read(data, pixels=10 ** 4).shape[:2] == (height, width)
+
+
 @pytest.mark.parametrize('start', [
     b'BM', b'GIF89a', b'RIFF\0\0\0\0WEBP', b'MM\0*', b'P5\n9 9\n255\n', b'\xff\xd8\0',
     b'\xffO\xffQ', b'\x89PNX\r\n\x1a\n'])
