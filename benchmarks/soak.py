@@ -118,6 +118,8 @@ class Camera(Node):
         self._spin_until(lambda: self._images.get_subscription_count()
                          and self._starts.get_subscription_count()
                          and self.count_publishers(f'{NODE_NAME}/status'))
+        # Each learns of the other in its own time; an answer tells that both did.
+        self._spin_until(self._is_answered)
 
     def send(self, number: int, *, start: bool) -> FrameStatus:
         """Send a frame, with a box to start on if need be, and return the answer."""
@@ -134,6 +136,10 @@ class Camera(Node):
         """Leave the graph."""
         self._executor.shutdown()
         self.destroy_node()
+
+    def _is_answered(self) -> bool:
+        self._images.publish(self._film[0][0])
+        return self._answer is not None
 
     def _on_status(self, message: DiagnosticArray) -> None:
         stamp = message.header.stamp

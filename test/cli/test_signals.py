@@ -27,7 +27,7 @@ import time
 import cv2
 import pytest
 
-PATIENCE_SECONDS = 60.0
+PATIENCE_SECONDS = 100.0
 SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 by_name = pytest.mark.parametrize('number', SIGNALS, ids=lambda number: number.name)
 
@@ -182,7 +182,10 @@ def test_signal_during_the_imports_is_quiet(number, tmp_path):
 
 def ignores(process, number):
     """Tell whether a process of this machine ignores a signal."""
-    status = Path(f'/proc/{process}/status').read_text()
+    try:
+        status = Path(f'/proc/{process}/status').read_text()
+    except OSError:
+        return False
     return int(re.search(r'SigIgn:\s*(\w+)', status)[1], 16) >> (number - 1) & 1 == 1
 
 

@@ -33,6 +33,7 @@ trax = pytest.importorskip(
 
 REPOSITORY = Path(__file__).resolve().parents[2]
 SIZE = (160, 120)
+PATIENCE_SECONDS = 100.0
 
 
 def scene(box, dtype=np.uint8):
@@ -76,7 +77,7 @@ class Session:
 
     def ended(self):
         """Return the exit status and the error output, once the process is gone."""
-        _, errors = self.process.communicate(timeout=30)
+        _, errors = self.process.communicate(timeout=PATIENCE_SECONDS)
         return self.process.returncode, errors.decode()
 
 
@@ -145,6 +146,6 @@ def test_settings_that_do_not_exist_end_the_session_with_a_reason(tmp_path):
 
 def test_the_server_goes_when_its_client_is_gone():
     process = launch('--preset', 'hcs')
-    _, errors = process.communicate(timeout=60)
+    _, errors = process.communicate(timeout=PATIENCE_SECONDS)
     assert process.returncode == 1
     assert b'session ended' in errors

@@ -37,8 +37,9 @@ from msg_adapters.boxes import box_from_polygon, polygon_from_box
 from msg_adapters.image import message_from_image
 from msg_adapters.status import status_from_message
 
-# Longer than the 20 s after which the middleware forgets a participant that was killed.
-PATIENCE = 40.0
+# Generous for a machine under load, and longer than the 20 s after which the middleware forgets a
+# participant that was killed.
+PATIENCE = 100.0
 
 
 class FakeTracker:
@@ -93,6 +94,7 @@ class Graph:
         self.fake = FakeTracker()
         self.received = {}
         self.trackers = []
+        self._clients = {}
         self._stamp = 0
 
     def start_tracker(self, **values) -> TrackerNode:
@@ -127,11 +129,19 @@ class Graph:
 
     def call(self, kind, name, **fields):
         """Call a service and return its answer."""
-        client = self.user.create_client(kind, name)
+        if (kind, name) not in self._clients:
+            self._clients[kind, name] = self.user.create_client(kind, name)
+        client = self._clients[kind, name]
         self.spin_until(client.service_is_ready)
         future = client.call_async(kind.Request(**fields))
         self.spin_until(future.done)
         return future.result()
+
+    def settle(self) -> None:
+        """Wait until the nodes have heard everything that was published so far."""
+        for node in self.trackers:
+            self.call(GetParameters, f'{node.get_fully_qualified_name()}/get_parameters',
+                      names=['preset'])
 
     def spin_until(self, condition: Callable[[], bool]) -> None:
         """Let things happen until the condition holds."""
@@ -139,6 +149,13 @@ class Graph:
         while not condition():
             assert time.monotonic() < deadline, 'nothing happened in time'
             self.executor.spin_once(timeout_sec=0.02)
+
+    def answer(self, messages: list, image, since=0):
+        """Wait for the message with the header of an image, and return it."""
+        def found():
+            return [message for message in messages[since:] if message.header == image.header]
+        self.spin_until(found)
+        return found()[0]
 
     def image(self, value=0, *, stamp=None, shape=(48, 64), dtype=np.uint16) -> Image:
         """Return an image message with the next stamp."""
@@ -208,20 +225,15 @@ class Running:
         return [message.header for message in self._status_messages]
 
     def send(self, *images):
-        """Publish images one by one, and wait for the answer to each."""
+        """Publish images one by one, wait for the answer to each, and return the last status."""
         for image in images or [self.graph.image()]:
-            before = len(self._status_messages)
+            told, boxes = len(self._status_messages), len(self.boxes)
             self.images.publish(image)
-            self.graph.spin_until(lambda: len(self._status_messages) > before
-                                  and self._is_answered(image.header))
-        return self.statuses[-1]
-
-    def _is_answered(self, header):
-        """Tell whether the status and, if there has to be one, the box have arrived."""
-        if not self._status_messages or self._status_messages[-1].header != header:
-            return False
-        return self.statuses[-1].state not in ('tracking', 'uncertain') or (
-            self.boxes and self.boxes[-1].header == header)
+            status = status_from_message(
+                self.graph.answer(self._status_messages, image, told))
+            if status.state in ('tracking', 'uncertain'):
+                self.graph.answer(self.boxes, image, boxes)
+        return status
 
     def start(self, x=10, y=12, width=8, height=6):
         """Publish a box to start on, and wait until it has arrived."""
@@ -238,7 +250,7 @@ class Running:
 
     def settle(self):
         """Wait until everything that was published so far has been heard by the node."""
-        self.graph.call(GetParameters, 'lmsco_tracker/get_parameters', names=['preset'])
+        self.graph.settle()
 
     @property
     def last_box(self):

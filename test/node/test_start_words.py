@@ -35,6 +35,7 @@ from lmsco_ros.node.run import run
 
 REPOSITORY = Path(__file__).resolve().parents[2]
 COMMAND = [sys.executable, '-m', 'lmsco_ros.node.main']
+PATIENCE = 100.0
 NAMES = st.text('ab_', min_size=1, max_size=3)
 
 
@@ -64,7 +65,7 @@ def context():
 def command(*arguments, environment=None):
     """Run the command until it ends; return code, output and errors."""
     done = subprocess.run(
-        [*COMMAND, *arguments], cwd=REPOSITORY, capture_output=True, text=True, timeout=60,
+        [*COMMAND, *arguments], cwd=REPOSITORY, capture_output=True, text=True, timeout=PATIENCE,
         env={**os.environ, 'PYTHONPATH': str(REPOSITORY), **(environment or {})})
     return done.returncode, done.stdout, done.stderr
 
@@ -255,7 +256,7 @@ def test_arguments_in_the_wrong_place_are_refused(without_libraries):
 
 def test_without_ros_the_remedy_is_told():
     done = subprocess.run([sys.executable, '-S', '-m', 'lmsco_ros.node.main'], cwd=REPOSITORY,
-                          capture_output=True, text=True, timeout=60)
+                          capture_output=True, text=True, timeout=PATIENCE)
     assert done.returncode == 1 and done.stderr.count('\n') == 1
     assert all(word in done.stderr for word in ('rclpy', 'source', '`ros`'))
 

@@ -191,10 +191,11 @@ def test_image_size_may_change(running):
     running.start()
     running.send(running.graph.image(shape=(48, 64)))
     maps = running.graph.listen(Image, 'lmsco_tracker/confidence_map')
-    running.send(running.graph.image(shape=(20, 30), dtype=np.uint8))
-    running.graph.spin_until(lambda: maps)
+    small = running.graph.image(shape=(20, 30), dtype=np.uint8)
+    running.send(small)
     assert running.fake.calls[-1][1].shape == (20, 30)
-    assert (maps[-1].height, maps[-1].width) == (20, 30)
+    confidence = running.graph.answer(maps, small)
+    assert (confidence.height, confidence.width) == (20, 30)
 
 
 def test_stamps_may_go_backwards(running):
@@ -214,12 +215,13 @@ def test_confidence_map_is_aligned_and_computed_on_demand(running, monkeypatch):
     assert running.send().state == 'tracking'
     monkeypatch.undo()
     maps = running.graph.listen(Image, 'lmsco_tracker/confidence_map')
-    running.send()
-    running.graph.spin_until(lambda: maps)
+    image = running.graph.image()
+    running.send(image)
+    confidence = running.graph.answer(maps, image)
     expected = np.zeros((48, 64), np.float32)
     expected[12:18, 11:19] = 0.5
-    assert maps[-1].encoding == '32FC1'
-    np.testing.assert_array_equal(image_from_message(maps[-1]), expected)
+    assert confidence.encoding == '32FC1'
+    np.testing.assert_array_equal(image_from_message(confidence), expected)
 
 
 def test_overlay_shows_the_box_and_is_drawn_on_demand(running, monkeypatch):
@@ -228,14 +230,14 @@ def test_overlay_shows_the_box_and_is_drawn_on_demand(running, monkeypatch):
     assert running.send().state == 'idle'
     monkeypatch.undo()
     overlays = running.graph.listen(Image, 'lmsco_tracker/overlay')
-    running.send(running.graph.image(1000))
-    running.graph.spin_until(lambda: overlays)
-    plain = image_from_message(overlays[-1])
+    first, second = running.graph.image(1000), running.graph.image(1000)
+    running.send(first)
+    plain = image_from_message(running.graph.answer(overlays, first))
     running.start(30, 12, 16, 20)
-    running.send(running.graph.image(1000))
-    running.graph.spin_until(lambda: len(overlays) > 2)
-    drawn = image_from_message(overlays[-1])
-    assert overlays[-1].encoding == 'bgr8' and drawn.shape == (48, 64, 3)
+    running.send(second)
+    overlay = running.graph.answer(overlays, second)
+    drawn = image_from_message(overlay)
+    assert overlay.encoding == 'bgr8' and drawn.shape == (48, 64, 3)
     assert (drawn[25, 29:33] != plain[25, 29:33]).any()
     np.testing.assert_array_equal(drawn[40:, :28], plain[40:, :28])
 
@@ -321,7 +323,7 @@ def test_policy_all_answers_every_frame(run):
     images = [running.graph.image(value) for value in range(20)]
     for image in images:
         running.images.publish(image)
-    running.graph.spin_until(lambda: len(running.statuses) == 21)
+    running.graph.spin_until(lambda: len(running.statuses) == len(running.boxes) == 21)
     assert running.statuses[-1].dropped_frames == 0
     assert [box.header for box in running.boxes[1:]] == [image.header for image in images]
 

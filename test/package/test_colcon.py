@@ -26,8 +26,8 @@ import pytest
 rclpy = pytest.importorskip('rclpy', reason='needs ROS 2')
 
 REPOSITORY = Path(__file__).resolve().parents[2]
-STARTUP_SECONDS = 60
-EXIT_SECONDS = 20
+STARTUP_SECONDS = 100
+EXIT_SECONDS = 100
 
 
 def colcon(workspace, verb, *options):

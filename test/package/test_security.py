@@ -23,7 +23,7 @@ import pytest
 
 REPOSITORY = Path(__file__).resolve().parents[2]
 POLICY = REPOSITORY / 'config' / 'sros2_policy.xml'
-PATIENCE_SECONDS = 20.0
+PATIENCE_SECONDS = 100.0
 # Element: its attributes, and what may be in it; as in the schema of SROS 2 policies 0.2.0.
 SCHEMA = {
     'policy': ({'version': {'0.2.0'}}, {'contexts'}),
@@ -102,12 +102,13 @@ def _told(node):
                'reply': node.get_service_names_and_types_by_node,
                'request': node.get_client_names_and_types_by_node}
     known = {'publish': {entity.topic_name for entity in node.publishers},
-             'subscribe': {entity.topic_name for entity in node.subscriptions}}
+             'subscribe': {entity.topic_name for entity in node.subscriptions},
+             'reply': {node.resolve_service_name(entity.srv_name) for entity in node.services}}
     deadline = time.monotonic() + PATIENCE_SECONDS
     while True:
         told = {rule: {name for name, _ in query(node.get_name(), node.get_namespace())}
                 for rule, query in queries.items()}
-        if all(names <= told[rule] for rule, names in known.items()) and told['reply'] \
+        if all(names <= told[rule] for rule, names in known.items()) \
                 or time.monotonic() > deadline:
             return told
         time.sleep(0.05)
