@@ -86,10 +86,10 @@ def test_missing_contrib_build_is_named_with_its_remedy(monkeypatch):
 
 
 def test_model_files_are_asked_for():
-    with pytest.raises(TrackerError, match='vit:net.onnx'):
-        resolve('vit').build()
+    with pytest.raises(TrackerError, match='vittrack:net.onnx'):
+        resolve('vittrack').build()
     with pytest.raises(TrackerError, match='no model file'):
-        resolve('vit:/nowhere/net.onnx')
+        resolve('vittrack:/nowhere/net.onnx')
 
 
 def test_model_files_reach_opencv(tmp_path, monkeypatch):

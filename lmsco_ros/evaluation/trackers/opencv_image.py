@@ -21,6 +21,10 @@ import numpy as np
 import numpy.typing as npt
 
 
+STRETCHING = ('images of more than 8 bits are stretched to 8 bits: black is the 1st, white the '
+              '99th percentile of the image of each start')
+
+
 class EightBitView:
     """
     Map images of any depth to 8-bit BGR with the contrast of the first image.

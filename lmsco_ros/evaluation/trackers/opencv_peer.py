@@ -15,8 +15,8 @@
 """
 OpenCV's trackers as peers.
 
-MIL, NanoTrack and ViT are part of every OpenCV; CSRT, KCF, MOSSE and MedianFlow need
-its contrib build (extra `peers`). NanoTrack and ViT need model files from the user.
+MIL, NanoTrack and VitTrack are part of every OpenCV; CSRT, KCF, MOSSE and MedianFlow need
+its contrib build (extra `peers`). NanoTrack and VitTrack need model files from the user.
 """
 
 from __future__ import annotations
@@ -60,9 +60,10 @@ _RECIPES: Mapping[str, _Recipe] = {
     'mosse': _Recipe('legacy.TrackerMOSSE', smallest_side=_MOSSE_SMALLEST_SIDE),
     'medianflow': _Recipe('legacy.TrackerMedianFlow'),
     'nanotrack': _Recipe('TrackerNano', models=('backbone', 'neckhead')),
-    'vit': _Recipe('TrackerVit', models=('net',)),
+    'vittrack': _Recipe('TrackerVit', models=('net',)),
 }
 OPENCV_NAMES = tuple(_RECIPES)
+MODEL_FILES = {name: recipe.models for name, recipe in _RECIPES.items()}
 
 
 class OpenCVTracker:

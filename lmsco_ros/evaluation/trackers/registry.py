@@ -16,7 +16,7 @@
 From a name on the command line to a tracker.
 
 `hcs` (any preset), `config:FILE` (any configuration), `csrt` (any of OpenCV's),
-`nanotrack:backbone.onnx,head.onnx`, `vit:net.onnx`, `trax:NAME=command line` and
+`nanotrack:backbone.onnx,head.onnx`, `vittrack:net.onnx`, `trax:NAME=command line` and
 `python:module:callable`.
 """
 
@@ -28,9 +28,15 @@ from lmsco_ros.core import TrackerConfig
 from lmsco_ros.evaluation.errors import TrackerError
 from lmsco_ros.evaluation.trackers.configured import ConfiguredSpec
 from lmsco_ros.evaluation.trackers.interface import TrackerSpec
-from lmsco_ros.evaluation.trackers.opencv_peer import OPENCV_NAMES, OpenCVSpec
+from lmsco_ros.evaluation.trackers.nanotrack import (
+    answer_side, NANO_V3_NAME, NanoSpec, OPENCV_SIDE)
+from lmsco_ros.evaluation.trackers.opencv_peer import MODEL_FILES, OPENCV_NAMES, OpenCVSpec
 from lmsco_ros.evaluation.trackers.python_peer import PythonSpec
 from lmsco_ros.evaluation.trackers.trax_peer import TraxSpec
+
+
+# Trackers that see images of more than 8 bits through `EightBitView`.
+EIGHT_BIT_NAMES = (*OPENCV_NAMES, NANO_V3_NAME)
 
 
 def available_names() -> tuple[str, ...]:
@@ -66,7 +72,7 @@ def resolve(text: str) -> TrackerSpec:
         missing = [path for path in models if not path.is_file()]
         if missing:
             raise TrackerError(f'tracker {kind!r}: there is no model file {missing[0]}')
-        return OpenCVSpec(kind, models)
+        return _nanotrack(models) if kind == 'nanotrack' else OpenCVSpec(kind, models)
     if text in TrackerConfig.preset_names():
         return ConfiguredSpec(text, TrackerConfig.preset(text))
     if kind == 'config' and rest:
@@ -74,3 +80,18 @@ def resolve(text: str) -> TrackerSpec:
     known = ', '.join((*TrackerConfig.preset_names(), *OPENCV_NAMES))
     raise TrackerError(f'there is no tracker {text!r}; known are {known}, '
                        'config:FILE, trax:NAME=COMMAND and python:MODULE:CALLABLE')
+
+
+def name_with_files(name: str) -> str:
+    """Return how the tracker of that name is asked for, with words for its model files."""
+    kind = 'nanotrack' if name == NANO_V3_NAME else name
+    files = MODEL_FILES.get(kind, ())
+    return f'{kind}:{",".join(file.upper() for file in files)}' if files else name
+
+
+def _nanotrack(models: tuple[Path, ...]) -> TrackerSpec:
+    """Return NanoTrack by OpenCV's own class where that can read what the head answers."""
+    opencv = OpenCVSpec('nanotrack', models)
+    if len(models) != 2 or answer_side(*models) in (None, OPENCV_SIDE):
+        return opencv
+    return NanoSpec(*models)
