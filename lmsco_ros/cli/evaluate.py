@@ -25,10 +25,11 @@ from typing import Annotated, TYPE_CHECKING
 import typer
 
 from lmsco_ros.cli.console import (
-    fail, frame_progress, MISUSED, plain_errors, say, telling_what_is_kept, warn)
+    fail, frame_progress, MISUSED, plain_errors, say, show_table, telling_what_is_kept, warn)
 from lmsco_ros.extras import require_extra
 
 if TYPE_CHECKING:
+    from lmsco_ros.evaluation.datasets.parts import AnchorPlan
     from lmsco_ros.evaluation.runner import Evaluation
     from lmsco_ros.evaluation.session import Selection
     from lmsco_ros.evaluation.worker_pool import Job, Outcome
@@ -39,6 +40,7 @@ class Protocol(str, Enum):
 
     OPE = 'ope'
     VOT = 'vot'
+    ANCHORS = 'anchors'
 
 
 SplitOption = Annotated[Path | None, typer.Option(
@@ -63,10 +65,18 @@ def evaluate(
     tracker: Annotated[list[str] | None, typer.Option(
         show_default='all that work here',
         help='Preset, config:FILE (YAML), csrt, kcf, mil, mosse, medianflow, '
-             'nanotrack:BACKBONE,HEAD, vit:NET, trax:NAME=COMMAND or python:MODULE:CALLABLE. '
+             'nanotrack:BACKBONE,HEAD, vittrack:NET, trax:NAME=COMMAND or '
+             'python:MODULE:CALLABLE. For the peers of OpenCV, images of more than 8 bits are '
+             'stretched from the 1st to the 99th percentile of the image of each start. '
              'May be repeated.')] = None,
     protocol: Annotated[Protocol, typer.Option(
-        help='ope: one pass; vot: start again after each failure.')] = Protocol.OPE,
+        help='ope: one pass; vot: start again after each failure; anchors: start at several '
+             'frames of each sequence.')] = Protocol.OPE,
+    every: Annotated[int | None, typer.Option(
+        min=1, show_default='50', help='anchors: frames from one start to the next.')] = None,
+    length: Annotated[int | None, typer.Option(
+        min=2, show_default='to the end or back to the beginning, whichever is farther',
+        help='anchors: track N frames forward from each start.')] = None,
     sequences: Annotated[str, typer.Option(
         help='Pattern of names, such as "vot_tir/*" or "bird*".')] = '*',
     frames: Annotated[int | None, typer.Option(
@@ -93,7 +103,8 @@ def evaluate(
     with plain_errors():
         with _misuse():
             request = Request(dataset, sequences, frames, split, part,
-                              challenge_names(challenge or []))
+                              challenge_names(challenge or []),
+                              _anchors(protocol, every, length))
             trackers, unavailable = (
                 (build_trackers(tracker), ()) if tracker else buildable_trackers())
             for reason in unavailable:
@@ -110,6 +121,7 @@ def evaluate(
             with alone_in(output):
                 evaluation.finish(describe(request, jobs, skipped))
                 page = _report(output, selection)
+        _tell_starts(output, protocol)
         say(f'report: {page}')
 
 
@@ -145,6 +157,32 @@ def _misuse() -> Iterator[None]:
         fail(str(error), MISUSED)
 
 
+def _anchors(protocol: Protocol, every: int | None,
+             length: int | None) -> AnchorPlan | None:
+    """Return where trackers are started under the protocol of several starts."""
+    from lmsco_ros.evaluation.datasets.parts import ANCHOR_SPACING, AnchorPlan
+
+    if protocol is Protocol.ANCHORS:
+        return AnchorPlan(every or ANCHOR_SPACING, length)
+    if every is not None or length is not None:
+        fail('--every and --length say where several starts are; they go with '
+             '--protocol anchors', MISUSED)
+    return None
+
+
+def _tell_starts(output: Path, protocol: Protocol) -> None:
+    """Show the figures of several starts."""
+    from lmsco_ros.evaluation.report.tables import anchor_overview
+    from lmsco_ros.evaluation.run_file import read_run
+    from lmsco_ros.evaluation.summaries.anchors import summarize_anchors
+
+    run = read_run(output, protocol.value) if protocol is Protocol.ANCHORS else None
+    if run is not None:
+        table = anchor_overview(summarize_anchors(run))
+        show_table(['tracker', *table.columns],
+                   [[row.tracker, *(cell.text for cell in row.cells)] for row in table.rows])
+
+
 def _kept(evaluation: Evaluation, output: Path) -> str:
     """Return what is kept of an evaluation that is broken off, and how it goes on."""
     total = len(evaluation.done) + len(evaluation.pending)
@@ -163,7 +201,8 @@ def _report(output: Path, selection: Selection) -> Path:
         raise ResultError('; '.join(complaints))
     for complaint in complaints:
         warn(f'not in the report: {complaint}')
-    return write_report(output, runs, {item.full_name: item for item in selection.sequences})
+    return write_report(output, runs, {
+        item.full_name: item for item in (*selection.wholes, *selection.sequences)})
 
 
 def _run(evaluation: Evaluation, jobs: int) -> None:

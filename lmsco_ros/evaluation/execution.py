@@ -72,6 +72,8 @@ def run_supervised(tracker: EvaluatedTracker, sequence: TrackingSequence) -> Tra
 PROTOCOLS: Mapping[str, Callable[[EvaluatedTracker, TrackingSequence], Trace]] = {
     'ope': run_one_pass,
     'vot': run_supervised,
+    # Its starts are the first frames of parts of sequences.
+    'anchors': run_one_pass,
 }
 
 

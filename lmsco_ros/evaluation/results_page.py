@@ -22,13 +22,14 @@ from pathlib import Path
 from lmsco_ros.evaluation.challenges import CHALLENGES
 from lmsco_ros.evaluation.errors import DatasetError
 from lmsco_ros.evaluation.execution import PROTOCOLS
-from lmsco_ros.evaluation.report.conditions import conditions, problems
+from lmsco_ros.evaluation.report.conditions import conditions, extent, problems
 from lmsco_ros.evaluation.report.formatting import spread_warning
 from lmsco_ros.evaluation.report.tables import (
-    absence_table, Cell, confidence_table, difference_rows, DifferenceRow, one_pass_table,
-    supervised_table, Table)
+    absence_table, anchor_table, border_table, Cell, confidence_table, difference_rows,
+    DifferenceRow, one_pass_table, supervised_table, Table)
 from lmsco_ros.evaluation.run_file import EvaluationRun, read_run
 from lmsco_ros.evaluation.split import Split
+from lmsco_ros.evaluation.summaries.anchors import anchor_interval, summarize_anchors
 from lmsco_ros.evaluation.summaries.confidence import summarize_confidence
 from lmsco_ros.evaluation.summaries.differences import differences
 from lmsco_ros.evaluation.summaries.one_pass import summarize_one_pass
@@ -61,6 +62,16 @@ the mean of the expected-overlap curve over sequence lengths of {low} to {high} 
 curve followed to the longest sequence (MATLAB toolkit). The figure of the Python toolkit,
 whose curve ends at the tracker's own longest fragment and which so overrates trackers that
 fail early, stands beside it.
+"""
+
+_ANCHORS_NOTE = """\
+Started on frames along each sequence and never helped again, as in the VOT challenges since
+2020. A tracker has failed where its overlap falls to .1 and does not rise above that within
+ten frames. Robustness is the share of frames before that, accuracy the mean overlap on them
+without the start; EAO is the mean of the expected-overlap curve over {low} to {high} frames,
+with overlap 0 after a failure. Success AUC is the mean over the starts, of all frames. A
+target enters when its first box touches the border of the image; all other starts are in
+view.
 """
 
 _CONFIDENCE_NOTE = """\
@@ -102,8 +113,8 @@ def results_page(folders: Sequence[Path], split: Split | None = None) -> str:
     scenes = split.scenes if split else {}
     parts = [_INTRODUCTION, *([split.about] if split and split.about else [])]
     for title, groups, challenge in _scenes(next(iter(runs.values())), scenes):
-        parts += _scene(title, {name: run.only(groups, challenge)
-                                for name, run in runs.items()})
+        found = {name: run.only(groups, challenge) for name, run in runs.items()}
+        parts += _scene(title, {name: run for name, run in found.items() if run.sequences})
     parts += ['## Conditions\n', _conditions(runs)]
     return '\n'.join(parts)
 
@@ -150,9 +161,8 @@ def _scenes(run: EvaluationRun, scenes: Mapping[str, tuple[str, ...]],
 
 def _scene(title: str, runs: Mapping[str, EvaluationRun]) -> list[str]:
     main = next(iter(runs.values()))
-    frames = sum(len(sequence.ground_truth) for sequence in main.sequences)
-    count = f'{len(main.sequences)} sequences, {frames} frames.'
-    parts = [f'## {title}\n', f'{count} {spread_warning(len(main.sequences))}'.strip() + '\n']
+    count = f'{extent(main)}. {spread_warning(len(main.wholes))}'.strip()
+    parts = [f'## {title}\n', f'{count}\n']
     if 'ope' in runs:
         summaries = summarize_one_pass(runs['ope'])
         aucs = {item.tracker: item.aucs for item in summaries}
@@ -167,6 +177,11 @@ def _scene(title: str, runs: Mapping[str, EvaluationRun]) -> list[str]:
                   _markdown(supervised_table(supervised)),
                   _comparison(difference_rows(differences(failures, False), 2),
                               'failures per sequence (fewer is better)')]
+    if 'anchors' in runs:
+        starts = summarize_anchors(runs['anchors'])
+        low, high = anchor_interval(runs['anchors'])
+        parts += ['### Several starts\n', _ANCHORS_NOTE.format(low=low, high=high),
+                  _markdown(anchor_table(starts)), _markdown(border_table(starts))]
     return parts
 
 

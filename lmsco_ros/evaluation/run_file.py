@@ -15,15 +15,15 @@
 """
 The file that says what one evaluation consisted of.
 
-`run-ope.json` and `run-vot.json` in the output folder name trackers, sequences with
-their true boxes, records, machine and versions: with the records it is all that
-tables and the report are made from.
+`run-ope.json`, `run-vot.json` and `run-anchors.json` in the output folder name
+trackers, sequences with their true boxes, records, machine and versions: with the
+records it is all that tables and the report are made from.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -31,11 +31,13 @@ import numpy as np
 import numpy.typing as npt
 
 from lmsco_ros.evaluation.challenges import CHALLENGES
+from lmsco_ros.evaluation.datasets.sequence import Origin
 from lmsco_ros.evaluation.errors import ResultError
 from lmsco_ros.evaluation.execution import PROTOCOLS
 from lmsco_ros.evaluation.geometry import overlaps
 from lmsco_ros.evaluation.plain_values import (
-    box_rows, damaged, MISFITS, read_object, the_list, the_object, the_text, whole_numbers)
+    box_rows, damaged, MISFITS, read_object, the_list, the_object, the_text, whole_number,
+    whole_numbers)
 from lmsco_ros.evaluation.record_store import read_record
 from lmsco_ros.evaluation.trace import Trace
 from lmsco_ros.evaluation.whole_file import write_json
@@ -58,6 +60,8 @@ class SequenceInfo:
         Annotated attributes; empty where unknown.
     challenge : str
         What the sequence was made harder with; empty for one as it was recorded.
+    origin : Origin or None
+        The whole sequence that this is a part of; None for one that is whole.
 
     """
 
@@ -67,11 +71,17 @@ class SequenceInfo:
     ground_truth: npt.NDArray[np.float64]
     attributes: Mapping[str, npt.NDArray[np.bool_]]
     challenge: str = ''
+    origin: Origin | None = None
 
     @property
     def full_name(self) -> str:
         """Group and name."""
         return f'{self.group}/{self.name}'
+
+    @property
+    def whole(self) -> Origin:
+        """The sequence that this is a part of, or this one itself."""
+        return self.origin or Origin(self.full_name, len(self.ground_truth))
 
     def overlaps(self, trace: Trace, in_image: bool) -> npt.NDArray[np.float64]:
         """Return the overlap for each frame, on request only of what lies in the image."""
@@ -84,7 +94,8 @@ class SequenceInfo:
         flags = {name: np.flatnonzero(values).tolist()
                  for name, values in self.attributes.items()}
         return {'name': self.name, 'group': self.group, 'size': list(self.size),
-                'ground_truth': rows, 'attributes': flags, 'challenge': self.challenge}
+                'ground_truth': rows, 'attributes': flags, 'challenge': self.challenge,
+                'origin': None if self.origin is None else asdict(self.origin)}
 
     @classmethod
     def from_json(cls, content: Mapping[str, Any]) -> SequenceInfo:
@@ -103,7 +114,8 @@ class SequenceInfo:
         attributes = {name: np.isin(frames, whole_numbers(indices, len(boxes)))
                       for name, indices in the_object(content['attributes']).items()}
         return cls(the_text(content['name']), the_text(content['group']), (width, height),
-                   boxes, attributes, the_text(content.get('challenge', '')))
+                   boxes, attributes, the_text(content.get('challenge', '')),
+                   _origin(content.get('origin')))
 
 
 @dataclass(frozen=True, eq=False)
@@ -114,7 +126,7 @@ class EvaluationRun:
     Attributes
     ----------
     protocol : str
-        'ope' or 'vot'.
+        'ope', 'vot' or 'anchors'.
     sequences : tuple of SequenceInfo
         What was evaluated.
     traces : mapping of str to tuple of Trace
@@ -139,6 +151,11 @@ class EvaluationRun:
         return tuple(f'{sequence.full_name}: {trace.error}'
                      for sequence, trace in zip(self.sequences, self.traces[tracker])
                      if trace.error)
+
+    @property
+    def wholes(self) -> tuple[Origin, ...]:
+        """Whole sequences, however many parts of them were evaluated."""
+        return tuple(dict.fromkeys(sequence.whole for sequence in self.sequences))
 
     @property
     def challenges(self) -> tuple[str, ...]:
@@ -227,11 +244,20 @@ def _context(content: Any) -> Mapping[str, Any]:
     """Return what a run file says of its making, if it can be shown."""
     for name in ('machine', 'versions'):
         the_object(the_object(content).get(name, {}))
+    for number in the_object(content.get('anchors') or {}).values():
+        whole_number(number or 0)
     for item in the_list(content.get('skipped', [])):
         the_text(item['name'] + item['reason'])
     for word in (*the_list(content.get('challenges', [])), content.get('sequences', '')):
         the_text(word)
     return content
+
+
+def _origin(content: Any) -> Origin | None:
+    """Return the whole sequence that a run file names, if it does."""
+    if content is None:
+        return None
+    return Origin(the_text(the_object(content)['full_name']), whole_number(content['frames']))
 
 
 def _record(path: Path) -> Trace:

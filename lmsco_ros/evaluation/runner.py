@@ -40,7 +40,7 @@ class Evaluation:
     sequences : sequence of TrackingSequence
         On what; those whose first image cannot be read are skipped and noted.
     protocol : str
-        'ope' or 'vot'.
+        'ope', 'vot' or, on parts of sequences, 'anchors'.
     output : Path
         Folder for records and the run file.
 
@@ -132,4 +132,4 @@ class Evaluation:
             return
         self._infos[sequence.full_name] = SequenceInfo(
             sequence.name, sequence.group, (width, height),
-            sequence.ground_truth, sequence.attributes, sequence.challenge)
+            sequence.ground_truth, sequence.attributes, sequence.challenge, sequence.origin)

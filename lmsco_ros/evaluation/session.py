@@ -18,7 +18,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from datetime import date
 from difflib import get_close_matches
 from fnmatch import fnmatch
@@ -27,6 +27,7 @@ from typing import Any
 
 from lmsco_ros.evaluation.challenges import apply_challenge
 from lmsco_ros.evaluation.datasets import BrokenSequence, scan_dataset, TrackingSequence
+from lmsco_ros.evaluation.datasets.parts import anchored_parts, AnchorPlan
 from lmsco_ros.evaluation.environment import machine, versions
 from lmsco_ros.evaluation.errors import (
     DatasetError, RequestError, SequenceError, TrackerError)
@@ -55,6 +56,8 @@ class Request:
         That part.
     challenges : tuple of str
         Each sequence once with each of these challenges; empty: as it was recorded.
+    anchors : AnchorPlan or None
+        Parts that begin at anchors along each sequence; None: the sequence as a whole.
 
     """
 
@@ -64,14 +67,28 @@ class Request:
     split: Path | None = None
     part: str = 'test'
     challenges: tuple[str, ...] = ()
+    anchors: AnchorPlan | None = None
 
 
 @dataclass(frozen=True)
 class Selection:
-    """Sequences to evaluate, and those that would have been but are broken."""
+    """
+    What is evaluated.
+
+    Attributes
+    ----------
+    sequences : tuple of TrackingSequence
+        Sequences, or the parts of them that begin at anchors.
+    broken : tuple of BrokenSequence
+        Those that would have been evaluated but are broken.
+    wholes : tuple of TrackingSequence
+        The same as whole sequences.
+
+    """
 
     sequences: tuple[TrackingSequence, ...]
     broken: tuple[BrokenSequence, ...]
+    wholes: tuple[TrackingSequence, ...]
 
 
 def select_sequences(request: Request) -> Selection:
@@ -106,10 +123,14 @@ def select_sequences(request: Request) -> Selection:
     if request.challenges:
         chosen, unfit = _challenged(chosen, request.challenges)
         broken += unfit
+    wholes = chosen
+    if request.anchors is not None:
+        chosen, unfit = _parted(chosen, request.anchors)
+        broken += unfit
     if not chosen:
         reasons = ''.join(f'\n  {item.name}: {item.reason}' for item in broken)
         raise DatasetError(f'no sequence is left to evaluate{reasons}')
-    return Selection(tuple(chosen), tuple(broken))
+    return Selection(tuple(chosen), tuple(broken), tuple(wholes))
 
 
 def build_trackers(names: Sequence[str]) -> tuple[TrackerSpec, ...]:
@@ -162,6 +183,7 @@ def describe(request: Request, jobs: int, skipped: Sequence[BrokenSequence]) -> 
         'frames': request.frames,
         **({'split': request.split.name, 'part': request.part} if request.split else {}),
         'challenges': list(request.challenges), 'jobs': jobs,
+        'anchors': None if request.anchors is None else asdict(request.anchors),
         'date': date.today().isoformat(), 'machine': machine(), 'versions': dict(versions()),
         'skipped': [{'name': item.name, 'reason': item.reason} for item in skipped],
     }
@@ -201,6 +223,19 @@ def _challenged(sequences: Sequence[TrackingSequence], challenges: Sequence[str]
             except SequenceError as error:
                 unfit.append(BrokenSequence(f'{sequence.full_name}+{challenge}', str(error)))
     return made, unfit
+
+
+def _parted(sequences: Sequence[TrackingSequence], plan: AnchorPlan,
+            ) -> tuple[list[TrackingSequence], list[BrokenSequence]]:
+    """Return the parts of the sequences, and the sequences that have none."""
+    parts: list[TrackingSequence] = []
+    unfit = []
+    for sequence in sequences:
+        try:
+            parts += anchored_parts(sequence, plan)
+        except SequenceError as error:
+            unfit.append(BrokenSequence(sequence.full_name, str(error)))
+    return parts, unfit
 
 
 def _matches(full_name: str, pattern: str) -> bool:

@@ -53,7 +53,7 @@ _ENDING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 @dataclass(frozen=True, eq=False)
 class Job:
-    """One tracker on one sequence under one protocol ('ope' or 'vot')."""
+    """One tracker on one sequence under one of `PROTOCOLS`."""
 
     tracker: TrackerSpec
     sequence: TrackingSequence

@@ -66,6 +66,43 @@ def test_evaluate_then_results(lmsco, dataset, scripted, tmp_path):
     assert '| Scripted |' in table.read_text(encoding='utf-8')
 
 
+def test_several_starts_from_the_command_to_the_tables(lmsco, dataset, scripted, tmp_path,
+                                                       vot_folder):
+    boxes = [(0, 12, 10, 8)] + [(8 + index, 12, 10, 8) for index in range(11)]
+    vot_folder(dataset / 'vot_tir' / 'enters', [TRACK] * 12, boxes)
+    output = tmp_path / 'out'
+    common = ('evaluate', dataset, '--tracker', scripted, '--output', output,
+              '--protocol', 'anchors', '--every', 4)
+    first = lmsco(*common, '--jobs', 2)
+    assert first.exit_code == 0, first.output
+    assert 'AUC entering' in first.output and 'skipped vot_tir/torn' in first.output
+    assert {path.name.rpartition('-')[0] for path in output.rglob('records/**/*.json')} == {
+        f'vot_tir-{name}_{span}' for name in ('steady', 'rough', 'enters')
+        for span in ('0-11', '4-11', '8-0')}
+    again = lmsco(*common)
+    assert '9 results are there already, 0 to go' in again.output
+    shorter = lmsco(*common, '--length', 4)
+    assert '9 results are there already' not in shorter.output
+    page = (output / 'report.html').read_text(encoding='utf-8')
+    assert '3 sequences, 9 starts, 36 frames' in page and 'Entering and in view' in page
+    assert '--protocol anchors --every 4 --length 4' in page
+    table = tmp_path / 'results.md'
+    assert lmsco('results', output, '--page', table).exit_code == 0
+    text = table.read_text(encoding='utf-8')
+    assert '### Several starts' in text and '| tracker | entering: starts |' in text
+    assert '- sequences: vot_tir/enters, vot_tir/rough, vot_tir/steady\n' in text
+
+
+def test_pages_keep_their_pictures_when_several_starts_follow(lmsco, dataset, scripted, tmp_path):
+    output = tmp_path / 'out'
+    common = ('evaluate', dataset, '--tracker', scripted, '--output', output)
+    assert lmsco(*common).exit_code == 0
+    assert lmsco(*common, '--protocol', 'anchors').exit_code == 0
+    page = (output / 'report.html').read_text(encoding='utf-8')
+    assert 'first frame of steady' in page
+    assert 'id="one-pass"' in page and 'id="anchors"' in page
+
+
 def test_challenges_have_records_and_tables_of_their_own(lmsco, dataset, scripted, tmp_path):
     output = tmp_path / 'out'
     common = ('evaluate', dataset, '--tracker', scripted, '--output', output)
@@ -137,10 +174,12 @@ MISTAKES = [
     (('--tracker', 'python:no_such:Module'), 'cannot be imported'),
     (('--tracker', 'python:math:Tracker'), 'cannot be imported'),
     (('--tracker', 'python::'), 'python:: cannot be built'),
-    (('--tracker', 'vit:{folder}/data/vot_tir/rough/groundtruth.txt'), 'cannot use the model'),
+    (('--tracker', 'vittrack:{folder}/data/vot_tir/rough/groundtruth.txt'), 'cannot use the mo'),
     (('--sequences', 'stedy'), "matches 'stedy'; near are steady; a pattern is"),
     (('--sequences', '*/nothing'), 'there are vot_tir/rough, vot_tir/steady, vot_tir/torn; a'),
     (('--split', 'benchmarks/thermal_dev.yaml'), 'no sequence of this dataset'),
+    (('--every', '10'), 'they go with --protocol anchors'),
+    (('--length', '10', '--protocol', 'vot'), 'they go with --protocol anchors'),
     (('--challenge', 'fog'), "there is no challenge 'fog'; known are"),
 ]
 

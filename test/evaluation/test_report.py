@@ -14,6 +14,7 @@
 
 """The page is whole, self-contained, and holds everything that was run."""
 
+from dataclasses import replace
 from html.parser import HTMLParser
 
 import numpy as np
@@ -123,6 +124,14 @@ def test_page_holds_everything_and_refers_to_nothing_outside(parse, runs, tmp_pa
     names = {path.stem for path in (tmp_path / 'pictures').glob('*.png')}
     assert {'success', 'precision', 'normalized_precision', 'speed', 'ar_raw', 'ar_rank',
             'eao_curve', 'eao_order', 'failure_lazy_vot_tir_birds'} <= names
+
+
+def test_page_of_several_starts_alone(parse, runs):
+    page = parse({'anchors': replace(runs['ope'], protocol='anchors')})
+    # A plot, two thumbnails, and the strips of the tracker that never moved.
+    assert page.images == 1 + 2 + 2
+    assert '#anchors' in page.references
+    assert 'Success AUC (sequence@first-last frame) of each tracker on each sequence.' in page.text
 
 
 @pytest.mark.parametrize('protocol', ['ope', 'vot'])

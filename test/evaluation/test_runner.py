@@ -175,10 +175,12 @@ def test_any_damage_is_a_result_error_or_none(tmp_path_factory, cut, insert, rem
     lambda text: '{}', changed(records=[]), changed(records={'Scripted': ['no/such.json'] * 3}),
     changed(records={'Scripted': []}), changed(records={'Scripted': [1, 2, 3]}),
     changed(sequences=[]), changed(sequences=[1]), changed(protocol='vot'), changed(context=[]),
-    changed(context={'machine': 5}), changed(context={'skipped': [{}]}),
+    changed(context={'machine': 5}), changed(context={'anchors': {'length': 'far'}}),
+    changed(context={'skipped': [{}]}),
     lambda text: text.replace('"size": [64, 48]', '"size": [64]'),
     lambda text: text.replace('"challenge": ""', '"challenge": "of another version"'),
     lambda text: text.replace('"name": "calm"', '"name": 7'),
+    lambda text: text.replace('"origin": null', '"origin": {"full_name": "a"}'),
 ])
 def test_damaged_run_files_are_told_with_the_remedy(tmp_path, dataset, scripted, damage):
     sequences = scan_dataset(dataset).sequences

@@ -28,6 +28,24 @@ from lmsco_ros.evaluation.errors import SequenceError
 from lmsco_ros.evaluation.geometry import is_absent
 
 
+@dataclass(frozen=True)
+class Origin:
+    """
+    The whole sequence that a part was taken from.
+
+    Attributes
+    ----------
+    full_name : str
+        Its group and name.
+    frames : int
+        Its number of frames.
+
+    """
+
+    full_name: str
+    frames: int
+
+
 @dataclass(frozen=True, eq=False)
 class TrackingSequence:
     """
@@ -45,6 +63,8 @@ class TrackingSequence:
         Which frames show camera motion, occlusion and so on; empty where unknown.
     challenge : str
         What the sequence was made harder with; empty for a sequence as it was recorded.
+    origin : Origin or None
+        The whole sequence that this is a part of; None for one that is whole.
 
     """
 
@@ -54,6 +74,7 @@ class TrackingSequence:
     ground_truth: npt.NDArray[np.float64]
     attributes: Mapping[str, npt.NDArray[np.bool_]] = field(default_factory=dict)
     challenge: str = ''
+    origin: Origin | None = None
 
     def __post_init__(self) -> None:
         """Refuse frames and ground truth that do not belong together."""

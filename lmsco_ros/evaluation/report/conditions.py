@@ -20,6 +20,8 @@ from collections.abc import Mapping
 import shlex
 
 from lmsco_ros.evaluation.run_file import EvaluationRun
+from lmsco_ros.evaluation.trackers.opencv_image import STRETCHING
+from lmsco_ros.evaluation.trackers.registry import EIGHT_BIT_NAMES, name_with_files
 
 
 def command_line(run: EvaluationRun) -> str:
@@ -27,17 +29,29 @@ def command_line(run: EvaluationRun) -> str:
     context = run.context
     words = ['lmsco', 'evaluate', str(context.get('dataset', 'DATASET')),
              '--protocol', run.protocol]
-    for option in ('split', 'part', 'frames'):
-        if context.get(option):
-            words += [f'--{option}', str(context[option])]
+    plan = context.get('anchors') or {}
+    options = {'split': context.get('split'), 'part': context.get('part'),
+               'frames': context.get('frames'),
+               'every': plan.get('spacing'), 'length': plan.get('length')}
+    for option, value in options.items():
+        if value:
+            words += [f'--{option}', str(value)]
     if context.get('sequences', '*') != '*':
         words += ['--sequences', context['sequences']]
     for name in context.get('challenges', ()):
         words += ['--challenge', name]
     for name in run.trackers:
-        words += ['--tracker', name]
+        words += ['--tracker', name_with_files(name)]
     words += ['--jobs', str(context.get('jobs', 1)), '--output', 'results']
     return shlex.join(words)
+
+
+def extent(run: EvaluationRun) -> str:
+    """Return how much was evaluated: sequences, starts where there are several, frames."""
+    sequences, starts = len(run.wholes), len(run.sequences)
+    frames = sum(len(sequence.ground_truth) for sequence in run.sequences)
+    several = f'{starts} starts, ' if run.protocol == 'anchors' else ''
+    return f'{sequences} sequences, {several}{frames} frames'
 
 
 def conditions(runs: Mapping[str, EvaluationRun]) -> list[tuple[str, str]]:
@@ -51,8 +65,15 @@ def conditions(runs: Mapping[str, EvaluationRun]) -> list[tuple[str, str]]:
                              f'{main.context.get("jobs", 1)} at a time'))
     pairs.append(('versions', ', '.join(
         f'{name} {version}' for name, version in main.context.get('versions', {}).items())))
-    pairs.append(('sequences', ', '.join(sequence.full_name for sequence in main.sequences)))
+    stretched = [name for name in _trackers(runs) if name in EIGHT_BIT_NAMES]
+    if stretched:
+        pairs.append(('images', f'for {", ".join(stretched)}, {STRETCHING}'))
+    pairs.append(('sequences', ', '.join(whole.full_name for whole in main.wholes)))
     return pairs
+
+
+def _trackers(runs: Mapping[str, EvaluationRun]) -> tuple[str, ...]:
+    return tuple(dict.fromkeys(name for run in runs.values() for name in run.trackers))
 
 
 def problems(runs: Mapping[str, EvaluationRun]) -> list[str]:

@@ -47,7 +47,7 @@ def worst_failures(run: EvaluationRun) -> tuple[Failure, ...]:
     """
     result = []
     for name in run.trackers:
-        overlaps = [sequence.overlaps(trace, in_image=run.protocol == 'vot')
+        overlaps = [sequence.overlaps(trace, in_image=run.protocol != 'ope')
                     for sequence, trace in zip(run.sequences, run.traces[name])]
         means = np.array([np.nanmean(values) for values in overlaps])
         for index in np.argsort(means, kind='stable')[:_PER_TRACKER]:

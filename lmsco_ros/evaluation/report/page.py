@@ -17,7 +17,7 @@
 from __future__ import annotations
 
 import base64
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from importlib import resources
 from io import BytesIO
@@ -30,19 +30,21 @@ import numpy as np
 
 from lmsco_ros.evaluation.challenges import CHALLENGES
 from lmsco_ros.evaluation.datasets import TrackingSequence
+from lmsco_ros.evaluation.execution import PROTOCOLS
 from lmsco_ros.evaluation.record_store import file_name
-from lmsco_ros.evaluation.report.conditions import conditions, problems
+from lmsco_ros.evaluation.report.conditions import conditions, extent, problems
 from lmsco_ros.evaluation.report.failures import worst_failures
 from lmsco_ros.evaluation.report.formatting import number, spread_warning
 from lmsco_ros.evaluation.report.one_pass_plots import one_pass_plots
 from lmsco_ros.evaluation.report.pictures import (
     encode, failure_strip, thumbnail, TRUTH_COLOR)
 from lmsco_ros.evaluation.report.style import looks
-from lmsco_ros.evaluation.report.supervised_plots import supervised_plots
+from lmsco_ros.evaluation.report.supervised_plots import expected_overlap_plot, supervised_plots
 from lmsco_ros.evaluation.report.tables import (
-    absence_table, Cell, confidence_table, difference_rows, one_pass_table, Row,
-    supervised_table, Table)
+    absence_table, anchor_table, border_table, Cell, confidence_table, difference_rows,
+    one_pass_table, Row, supervised_table, Table)
 from lmsco_ros.evaluation.run_file import EvaluationRun
+from lmsco_ros.evaluation.summaries.anchors import anchor_interval, summarize_anchors
 from lmsco_ros.evaluation.summaries.attributes import attribute_names, summarize_attributes
 from lmsco_ros.evaluation.summaries.confidence import confidence_parts, summarize_confidence
 from lmsco_ros.evaluation.summaries.differences import differences
@@ -72,7 +74,7 @@ def write_report(output: Path, runs: Mapping[str, EvaluationRun],
     output : Path
         Folder of the evaluation.
     runs : mapping of str to EvaluationRun
-        The run under 'ope', under 'vot', or both.
+        The run under each protocol that has one.
     sequences : mapping of str to TrackingSequence
         Images of the sequences by full name; those missing get no pictures.
 
@@ -82,8 +84,8 @@ def write_report(output: Path, runs: Mapping[str, EvaluationRun],
         The page.
 
     """
-    main = runs.get('ope') or runs['vot']
-    caution = spread_warning(len(main.sequences))
+    main = _main(runs)
+    caution = spread_warning(len(main.wholes))
     pictures = output / 'pictures'
     trackers = dict.fromkeys(name for run in runs.values() for name in run.trackers)
     colors = {name: look.color for name, look in looks(trackers).items()}
@@ -93,6 +95,7 @@ def write_report(output: Path, runs: Mapping[str, EvaluationRun],
         conditions=conditions(runs),
         ope=_one_pass(runs['ope'], pictures) if 'ope' in runs else None,
         vot=_supervised(runs['vot'], pictures) if 'vot' in runs else None,
+        anchors=_several_starts(runs['anchors'], pictures) if 'anchors' in runs else None,
         failures=list(_failures(main, sequences, colors, pictures)),
         **_sequence_table(runs, sequences))
     path = output / 'report.html'
@@ -108,10 +111,8 @@ def _template() -> Any:
 
 
 def _subtitle(run: EvaluationRun, trackers: Iterable[str]) -> str:
-    frames = sum(len(sequence.ground_truth) for sequence in run.sequences)
     names = ', '.join(trackers)
-    return (f'{len(run.sequences)} sequences, {frames} frames of '
-            f'{run.context.get("dataset", "a dataset")} · {names} · '
+    return (f'{extent(run)} of {run.context.get("dataset", "a dataset")} · {names} · '
             f'{run.context.get("date", "")}')
 
 
@@ -159,6 +160,14 @@ def _supervised(run: EvaluationRun, folder: Path) -> dict[str, Any]:
     }
 
 
+def _several_starts(run: EvaluationRun, folder: Path) -> dict[str, Any]:
+    summaries = summarize_anchors(run)
+    interval = anchor_interval(run)
+    plots = {'anchors_eao_curve': expected_overlap_plot(summaries, interval)}
+    return {'table': anchor_table(summaries), 'border': border_table(summaries),
+            'plots': _save_plots(plots, folder), 'interval': interval}
+
+
 def _attributes(run: EvaluationRun, counted: str) -> Table | None:
     rows = []
     for tracker, figures in summarize_attributes(run).items():
@@ -171,10 +180,8 @@ def _attributes(run: EvaluationRun, counted: str) -> Table | None:
 
 def _sequence_table(runs: Mapping[str, EvaluationRun],
                     sequences: Mapping[str, TrackingSequence]) -> dict[str, Any]:
-    main = runs.get('ope') or runs['vot']
-    one_pass = 'ope' in runs
-    figures = ([item.aucs for item in summarize_one_pass(main)] if one_pass
-               else [item.accuracies for item in summarize_supervised(main)])
+    main = _main(runs)
+    figures, figure = _FIGURES[main.protocol](main)
     failures = _failure_counts(runs.get('vot'))
     rows = []
     for index, sequence in enumerate(main.sequences):
@@ -186,10 +193,24 @@ def _sequence_table(runs: Mapping[str, EvaluationRun],
             'size': f'{sequence.size[0]} × {sequence.size[1]}',
             'frames': len(sequence.ground_truth),
             'picture': _uri(encode(thumbnail(images), '.jpg'), 'jpeg') if images else None})
-    note = ('Success AUC' if one_pass else 'Accuracy') + ' of each tracker on each sequence'
+    note = f'{figure} of each tracker on each sequence'
     return {'sequence_rows': rows, 'sequence_columns': main.trackers,
             'sequence_note': note + ('; below it the failures under the VOT protocol.'
                                      if failures else '.')}
+
+
+# Under each protocol: the figures of each tracker on each sequence, and what they are.
+_FIGURES: Mapping[str, Callable[[EvaluationRun], tuple[list[Any], str]]] = {
+    'ope': lambda run: ([item.aucs for item in summarize_one_pass(run)], 'Success AUC'),
+    'vot': lambda run: ([item.accuracies for item in summarize_supervised(run)], 'Accuracy'),
+    'anchors': lambda run: ([item.aucs for item in summarize_anchors(run)],
+                            'Success AUC (sequence@first-last frame)'),
+}
+
+
+def _main(runs: Mapping[str, EvaluationRun]) -> EvaluationRun:
+    """Return the run that the sequences are shown from."""
+    return next(runs[protocol] for protocol in PROTOCOLS if protocol in runs)
 
 
 def _failure_counts(run: EvaluationRun | None) -> dict[tuple[str, str], int]:

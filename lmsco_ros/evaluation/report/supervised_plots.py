@@ -24,6 +24,7 @@ import numpy as np
 
 from lmsco_ros.evaluation.report.formatting import number
 from lmsco_ros.evaluation.report.style import legend, legend_beside, looks, new_axes
+from lmsco_ros.evaluation.summaries.anchors import AnchorSummary
 from lmsco_ros.evaluation.summaries.supervised import SupervisedSummary
 
 Summaries = Sequence[SupervisedSummary]
@@ -45,7 +46,7 @@ def supervised_plots(summaries: Summaries, interval: tuple[int, int]) -> dict[st
     return {
         'ar_raw': _accuracy_robustness_raw(summaries),
         'ar_rank': _accuracy_robustness_ranks(summaries),
-        'eao_curve': _expected_overlap(summaries, interval),
+        'eao_curve': expected_overlap_plot(summaries, interval),
         'eao_order': _order(summaries),
     }
 
@@ -82,7 +83,9 @@ def _accuracy_robustness_ranks(summaries: Summaries) -> Figure:
     return figure
 
 
-def _expected_overlap(summaries: Summaries, interval: tuple[int, int]) -> Figure:
+def expected_overlap_plot(summaries: Sequence[SupervisedSummary | AnchorSummary],
+                          interval: tuple[int, int]) -> Figure:
+    """Return the expected-overlap curves, with the interval that EAO is the mean over."""
     figure, axes = new_axes('Expected average overlap', 'sequence length [frames]',
                             'expected overlap')
     style = looks(item.tracker for item in summaries)

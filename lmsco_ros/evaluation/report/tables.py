@@ -23,12 +23,13 @@ from typing import Generic, TypeVar
 
 from lmsco_ros.evaluation.protocols.bootstrap import Estimate
 from lmsco_ros.evaluation.report.formatting import interval, number, signed
+from lmsco_ros.evaluation.summaries.anchors import AnchorSummary, StartFigures
 from lmsco_ros.evaluation.summaries.confidence import ConfidenceSummary
 from lmsco_ros.evaluation.summaries.differences import Difference
 from lmsco_ros.evaluation.summaries.one_pass import OnePassSummary
 from lmsco_ros.evaluation.summaries.supervised import SupervisedSummary
 
-Summary = TypeVar('Summary', OnePassSummary, SupervisedSummary, ConfidenceSummary)
+Summary = TypeVar('Summary', OnePassSummary, SupervisedSummary, AnchorSummary, ConfidenceSummary)
 
 
 @dataclass(frozen=True)
@@ -126,6 +127,44 @@ def supervised_table(summaries: Sequence[SupervisedSummary]) -> Table:
         _Column('accuracy rank', lambda item: _plain(item.accuracy_rank), 2, -1),
         _Column('robustness rank', lambda item: _plain(item.robustness_rank), 2, -1))
     return _table(columns, summaries, lambda item: item.eao)
+
+
+def anchor_table(summaries: Sequence[AnchorSummary]) -> Table:
+    """Return the main table of a run with several starts a sequence."""
+    columns: tuple[_Column[AnchorSummary], ...] = (
+        _Column('EAO', lambda item: item.eao),
+        _Column('accuracy', lambda item: item.all_starts.accuracy),
+        _Column('robustness', lambda item: item.all_starts.robustness),
+        _Column('success AUC', lambda item: item.all_starts.success_auc),
+        _Column('starts', lambda item: _plain(item.all_starts.starts), 0, 0),
+        _Column('failures', lambda item: _plain(item.all_starts.failures), 0, -1))
+    return _table(columns, summaries, lambda item: item.eao)
+
+
+def border_table(summaries: Sequence[AnchorSummary]) -> Table:
+    """Return the table of starts at the border of the image and of starts in view."""
+    columns = (*_start_columns('entering', lambda item: item.entering),
+               *_start_columns('in view', lambda item: item.in_view))
+    return _table(columns, summaries, None)
+
+
+def _start_columns(title: str, group: Callable[[AnchorSummary], StartFigures],
+                   ) -> tuple[_Column[AnchorSummary], ...]:
+    return (_Column(f'{title}: starts', lambda item: _plain(group(item).starts), 0, 0),
+            _Column('success AUC', lambda item: group(item).success_auc),
+            _Column('accuracy', lambda item: group(item).accuracy),
+            _Column('robustness', lambda item: group(item).robustness))
+
+
+def anchor_overview(summaries: Sequence[AnchorSummary]) -> Table:
+    """Return the few figures of a run with several starts that a terminal has room for."""
+    columns: tuple[_Column[AnchorSummary], ...] = (
+        _Column('EAO', lambda item: item.eao),
+        _Column('accuracy', lambda item: item.all_starts.accuracy),
+        _Column('robustness', lambda item: item.all_starts.robustness),
+        _Column('AUC entering', lambda item: item.entering.success_auc),
+        _Column('AUC in view', lambda item: item.in_view.success_auc))
+    return _table(columns, summaries, None)
 
 
 def confidence_table(summaries: Sequence[ConfidenceSummary]) -> Table:

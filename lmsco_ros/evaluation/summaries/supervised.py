@@ -21,14 +21,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from lmsco_ros.evaluation.geometry import Array, has_jumped
-from lmsco_ros.evaluation.protocols.bootstrap import (
-    Estimate, estimate, mean_estimate, ratio_estimate)
-from lmsco_ros.evaluation.protocols.expected_overlap import (
-    curve_terms, expected_average_overlap, expected_overlap_curve, longest_fragment,
-    VOT_TIR2016_INTERVAL)
+from lmsco_ros.evaluation.protocols.bootstrap import Estimate, mean_estimate, ratio_estimate
+from lmsco_ros.evaluation.protocols.expected_overlap import longest_fragment, VOT_TIR2016_INTERVAL
 from lmsco_ros.evaluation.protocols.ranking import mean_ranks
 from lmsco_ros.evaluation.protocols.supervised import accuracy, Fragment, fragments, reliability
 from lmsco_ros.evaluation.run_file import EvaluationRun
+from lmsco_ros.evaluation.summaries.expected_overlap import curve_and_eao
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,7 +114,7 @@ def _summarize(run: EvaluationRun, name: str,
     accuracies, failures, parts = figures
     lengths = np.array([float(len(sequence.ground_truth)) for sequence in run.sequences])
     rate = ratio_estimate(failures, lengths)
-    curve, eao = _expected_overlap(parts, int(lengths.max()), eao_interval(run))
+    curve, eao = curve_and_eao(parts, int(lengths.max()), eao_interval(run))
     ours = longest_fragment([fragment for part in parts for fragment in part])
     return SupervisedSummary(
         tracker=name, accuracies=accuracies, failures=failures,
@@ -128,23 +126,10 @@ def _summarize(run: EvaluationRun, name: str,
                                for failed in (rate.value, rate.high, rate.low))),
         accuracy_rank=float(ranks[0]), robustness_rank=float(ranks[1]),
         curve=curve, eao=eao,
-        eao_python=_expected_overlap(parts, ours, eao_interval(run))[1],
+        eao_python=curve_and_eao(parts, ours, eao_interval(run))[1],
         crashes=run.crashes(name))
 
 
 def _failures_at_jumps(run: EvaluationRun, name: str) -> int:
     return sum(int(has_jumped(sequence.ground_truth)[list(trace.failures)].sum())
                for sequence, trace in zip(run.sequences, run.traces[name]))
-
-
-def _expected_overlap(parts: list[list[Fragment]], length: int,
-                      interval: tuple[int, int]) -> tuple[Array, Estimate]:
-    terms = [curve_terms(part, length) for part in parts]
-    sums, counts = (np.array(kind) for kind in zip(*terms))
-
-    def score(weights: Array) -> Array:
-        curve = expected_overlap_curve(weights @ sums, weights @ counts)
-        return expected_average_overlap(curve, interval)
-
-    return (expected_overlap_curve(sums.sum(axis=0), counts.sum(axis=0)),
-            estimate(score, len(parts)))
