@@ -170,8 +170,8 @@ def _left_out(node: ast.stmt) -> Iterator[ast.AST]:
 
 
 def _returned_nothing(node: ast.Return) -> Iterator[ast.AST]:
-    """Yield a return without the value."""
-    if node.value is not None and ast.unparse(node.value) != 'None':
+    """Yield a return without the value; a constant is changed itself."""
+    if not isinstance(node.value, (ast.Constant, type(None))):
         yield ast.Return(ast.Constant(None))
 
 

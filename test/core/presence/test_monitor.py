@@ -265,6 +265,10 @@ def test_assessment_holds_what_it_is_made_of(monitor):
     assert monitor.assess(replace(HALF, presence=None)).presence is None
 
 
+def test_what_is_not_measured_does_not_speak_against_the_target():
+    assert Evidence(10.0) == Evidence(10.0, likeness=1.0, presence=None, jump=0.0)
+
+
 def test_usual_odds_follow_those_of_certain_frames_by_three_in_a_hundred():
     monitor = PresenceMonitor(CONFIG)
     assert monitor.assess(HALF).presence == 0.0
@@ -392,6 +396,14 @@ def test_missed_frames_set_no_reference_and_are_not_usual():
     judge(monitor, NOTHING)
     assert monitor.assess(Evidence(2.0)).quality == 1
     assert monitor.assess(Evidence(2.0, presence=1.0)).presence == 1.0
+
+
+def test_no_sharpness_is_no_reference_even_where_nothing_is_missed():
+    monitor = PresenceMonitor(replace(CONFIG, lost=0.0))
+    assert judge(monitor, Evidence(0.0)).state is TrackState.UNCERTAIN
+    assert monitor.assess(Evidence(8.0)).quality == 1
+    judge(monitor, Evidence(0.5))
+    assert monitor.assess(Evidence(1.0)).quality == 2
 
 
 def test_reference_is_that_of_as_many_frames_as_asked_for(monitor):
