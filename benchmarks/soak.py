@@ -303,7 +303,11 @@ def _options() -> tuple[Plan, Path]:
             parser.add_argument(option, type=type(default), default=default)
     options = vars(parser.parse_args())
     output = options.pop('output')
-    return Plan(**options), output
+    plan = Plan(**options)
+    if plan.frames < plan.every:
+        parser.error(f'{plan.frames} frames give no sample; '
+                     f'give {plan.every} or more, or a smaller --every')
+    return plan, output
 
 
 def main() -> int:

@@ -67,3 +67,10 @@ def test_growth_after_the_warm_up_is_told(soak, field, values, word):
     told = soak.complaints(samples, 200)
     assert word in told[0] if word else not told
     assert 'too few' in soak.complaints(samples[:3], 200)[0]
+
+
+def test_run_without_a_sample_is_refused(soak, monkeypatch, capsys):
+    monkeypatch.setattr('sys.argv', ['soak.py', '--frames', '59', '--every', '60'])
+    with pytest.raises(SystemExit):
+        soak.main()
+    assert 'give 60 or more' in capsys.readouterr().err
