@@ -39,7 +39,7 @@ def register(app: typer.Typer) -> None:
 
 def make_bag(
     source: Annotated[Path, typer.Argument(
-        exists=True, show_default=False, help='Folder of images, or video file.')],
+        exists=True, show_default=False, help='Folder of images, TIFF stack, or video file.')],
     output: Annotated[Path, typer.Option(
         show_default=False, help='Folder of the new bag; it must not exist.')],
     storage: Annotated[Storage, typer.Option(help='File format.')] = Storage.MCAP,

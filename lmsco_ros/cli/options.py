@@ -49,7 +49,7 @@ def parse_box(text: str) -> Box:
 
 SourceArgument = Annotated[Path, typer.Argument(
     exists=True, show_default=False,
-    help='Folder of images, TIFF stack, video file, or rosbag2 (sqlite3 or mcap).')]
+    help='Folder of images, TIFF stack, video file, or bag (rosbag2 or ROS 1).')]
 BagArgument = Annotated[Path, typer.Argument(
     exists=True, show_default=False, help='rosbag2 (sqlite3 or mcap).')]
 InitOption = Annotated[Box, typer.Option(
