@@ -154,7 +154,7 @@ def _images_in(folder: Path) -> ImageFiles:
     inner = [child.name for child in sorted(folder.iterdir())
              if child.is_dir() and ImageFiles.in_folder(child) is not None]
     hint = (f'its folder {inner[0]} has some: give {folder / inner[0]}' if inner
-            else 'give a folder with png, jpg, tiff or bmp files')
+            else 'give a folder with png, jpg, tiff, bmp or pgm files')
     raise SourceError(f'{folder} has no images; {hint}')
 
 
