@@ -22,7 +22,7 @@ import numpy as np
 import pytest
 from rosbags.highlevel import AnyReader
 
-PATIENCE_SECONDS = 60.0
+PATIENCE_SECONDS = 100.0
 
 
 def connections_of(path):

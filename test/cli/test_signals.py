@@ -61,7 +61,7 @@ def tracking(lmsco_process, tmp_path, endless_folder, start):
     return begin
 
 
-@by_name
+@pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM], ids=['SIGINT', 'SIGTERM'])
 def test_signal_keeps_what_was_tracked_and_says_so(tracking, tmp_path, number):
     process = tracking()
     process.send_signal(number)

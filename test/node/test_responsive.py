@@ -32,6 +32,7 @@ from msg_adapters.compressed import compressed_from_image
 from msg_adapters.image import image_from_message
 
 SECOND = 10 ** 9
+PATIENCE = 100.0
 KEEP_ALL = QoSProfile(depth=0, history=HistoryPolicy.KEEP_ALL,
                       reliability=ReliabilityPolicy.RELIABLE)
 EVERY_IMAGE = {'frame_policy': 'all', 'queue_size': 3, 'image_reliability': 'reliable',
@@ -90,7 +91,7 @@ def test_executor_is_woken_when_there_is_room_again(run, monkeypatch):
     monkeypatch.setattr(running.graph.executor, 'wake', woken.set)
     assert not woken.is_set()
     running.fake.gate.set()
-    assert woken.wait(40)
+    assert woken.wait(PATIENCE)
 
 
 @pytest.mark.parametrize('parameters', [{}, EVERY_IMAGE])
@@ -99,7 +100,7 @@ def test_costly_image_is_decoded_beside_the_executor(run, monkeypatch, parameter
 
     def costly(message):
         entered.set()
-        assert done.wait(40)
+        assert done.wait(PATIENCE)
         return image_from_message(message)
     monkeypatch.setattr(inputs, 'image_from_message', costly)
     running = run(**parameters)
@@ -116,7 +117,7 @@ def test_costly_image_is_decoded_beside_the_executor(run, monkeypatch, parameter
 
 def test_costly_image_is_told_in_the_diagnostics(run, monkeypatch):
     done = threading.Event()
-    monkeypatch.setattr(inputs, 'image_from_message', lambda message: done.wait(40))
+    monkeypatch.setattr(inputs, 'image_from_message', lambda message: done.wait(PATIENCE))
     running = run(no_image_timeout=0.1)
     health = running.graph.listen(DiagnosticArray, '/diagnostics')
     try:

@@ -15,6 +15,7 @@
 
 """The process ends on a signal: soon, with code 0, without a traceback, whatever it is at."""
 
+import gc
 import os
 from pathlib import Path
 import signal
@@ -24,6 +25,8 @@ import threading
 
 import pytest
 from sensor_msgs.msg import Image, RegionOfInterest
+
+from lmsco_ros.node.run import run
 
 REPOSITORY = Path(__file__).resolve().parents[2]
 SIGNALS = [signal.SIGINT, signal.SIGTERM, signal.SIGHUP]
@@ -101,7 +104,7 @@ def ends_cleanly(process, number):
     assert 'Traceback' not in output + errors and 'rror' not in output + errors
 
 
-@pytest.mark.parametrize('number', SIGNALS)
+@pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM])
 def test_signal_ends_the_process_cleanly(start, number):
     process = start('-m', 'lmsco_ros.node.main')
     wait_for(process, READY)
@@ -123,6 +126,13 @@ def test_signal_that_waits_from_the_very_start_is_heeded(start, number):
     """Signals that were blocked outside are not lost, and the mask outlives every exec."""
     process = start('-m', 'lmsco_ros.node.main',
                     preexec_fn=lambda: signal.pthread_sigmask(signal.SIG_BLOCK, SIGNALS))
+    ends_cleanly(process, number)
+
+
+@pytest.mark.parametrize('number', SIGNALS)
+def test_each_signal_tells_the_node_to_end(start, number):
+    process = start('-c', PROCESS.format(body='ending.wait(); return 0'))
+    wait_for(process, 'running')
     ends_cleanly(process, number)
 
 
@@ -178,9 +188,11 @@ def test_hang_up_is_heeded_unless_it_is_ignored(start, prefix, heeded):
 
 def test_collections_do_not_go_through_the_libraries():
     """A full collection while running would take as long as several frames."""
-    code = ('import gc, threading; from lmsco_ros.node.run import run; ended = threading.Event();'
-            ' ended.set(); run([], ended); print(gc.get_freeze_count(), len(gc.get_objects()))')
-    process = subprocess.run([sys.executable, '-c', code], cwd=REPOSITORY, capture_output=True,
-                             text=True, timeout=PATIENCE, check=True)
-    frozen, others = map(int, process.stdout.split()[-2:])
+    ended = threading.Event()
+    ended.set()
+    try:
+        run([], ended)
+        frozen, others = gc.get_freeze_count(), len(gc.get_objects())
+    finally:
+        gc.unfreeze()
     assert frozen > 100_000 and frozen > 10 * others

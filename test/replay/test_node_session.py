@@ -48,7 +48,7 @@ class Follower:
 
     def update(self, image):
         if self.gate is not None:
-            self.gate.wait(10)
+            self.gate.wait(100)
         state = TrackState.LOST if image[0, 0] == 255 else TrackState.TRACKING
         return self._result(image, BoundingBox(float(image[0, 0]), 6, 10, 12), state)
 
@@ -108,7 +108,7 @@ def test_other_outputs_are_heard():
         player = Player(running, lambda message, stamp, seconds: heard.append(message))
         play(player, range(5))
         while {'confidence_map', 'overlay', 'marker'} - {h.output for h in heard}:
-            message = running.next_message(10)
+            message = running.next_message(100)
             assert message is not None
             heard.append(message)
 
@@ -160,7 +160,7 @@ def test_waiting_for_a_moment_never_takes_for_ever():
                 running.next_message(1e-9)
         thread = threading.Thread(target=listen, daemon=True)
         thread.start()
-        thread.join(30)
+        thread.join(100)
         assert not thread.is_alive()
 
 
