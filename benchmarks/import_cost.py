@@ -112,7 +112,8 @@ def main(arguments: list[str] | None = None) -> None:
                      before.resident, after.resident, f'{before.modules:.0f}',
                      f'{after.modules:.0f}'))
     print(markdown_table(
-        ('in a fresh process', 'time, after / before', 'processor time, after / before',
+        ('in a fresh process', 'time on the clock, after / before',
+         'processor time, after / before',
          'memory before (MiB)', 'after (MiB)', 'modules before', 'after'), rows))
 
 

@@ -46,7 +46,7 @@ from lmsco_ros.evaluation.geometry import is_absent, overlaps
 from lmsco_ros.evaluation.session import Request
 from lmsco_ros.evaluation.trackers import resolve
 from lmsco_ros.evaluation.trackers.configured import ConfiguredTracker
-from lmsco_ros.evaluation.trackers.interface import Answer, Tracker
+from lmsco_ros.evaluation.trackers.interface import Answer, EvaluatedTracker
 
 
 @dataclass(frozen=True)
@@ -73,7 +73,7 @@ class Race:
     lost: np.ndarray
 
 
-def build_tracker(name: str) -> Tracker:
+def build_tracker(name: str) -> EvaluatedTracker:
     """
     Return a tracker by the name of a preset, a YAML file or a peer.
 
@@ -91,7 +91,7 @@ def build_tracker(name: str) -> Tracker:
     return resolve(name).build()
 
 
-def buildable(names: Sequence[str]) -> dict[str, Tracker]:
+def buildable(names: Sequence[str]) -> dict[str, EvaluatedTracker]:
     """Return the trackers that can be built; say why others cannot."""
     found = {}
     for name in names:
@@ -108,14 +108,14 @@ class Runner:
 
     Parameters
     ----------
-    tracker : Tracker
+    tracker : EvaluatedTracker
         Started on the first frame.
     clip : Clip
         The frames.
 
     """
 
-    def __init__(self, tracker: Tracker, clip: Clip) -> None:
+    def __init__(self, tracker: EvaluatedTracker, clip: Clip) -> None:
         self.answers: list[Answer] = []
         self._tracker = tracker
         self._frames = iter(clip.frames)
@@ -134,7 +134,7 @@ class Runner:
         self.answers.append(self._answer)
 
 
-def run_race(trackers: Sequence[Tracker], clip: Clip, threads: int) -> Race:
+def run_race(trackers: Sequence[EvaluatedTracker], clip: Clip, threads: int) -> Race:
     """Show every frame of a clip to every tracker."""
     runners = [Runner(tracker, clip) for tracker in trackers]
     # Building or starting a tracker may have set the number for the whole process.

@@ -23,6 +23,15 @@ import pytest
 REPOSITORY = Path(__file__).resolve().parents[2]
 OF_EXTRAS = {'av', 'backports', 'google', 'jinja2', 'lz4', 'matplotlib', 'platformdirs',
              'requests', 'rich', 'rosbags', 'scipy.io', 'typer', 'urllib3'}
+HCS_AT_WORK = """
+import numpy as np
+from lmsco_ros.core import LMSCOTracker
+
+image = np.random.default_rng(1).integers(0, 255, (96, 128), np.uint8)
+tracker = LMSCOTracker('hcs')
+tracker.initialize(image, (50, 40, 24, 24))
+tracker.update(image)
+"""
 TRACKER = 'from lmsco_ros.core import LMSCOTracker; LMSCOTracker({!r})'
 NODE = """
 import rclpy
@@ -52,6 +61,7 @@ def imported_by(code):
 @pytest.mark.parametrize('code, needless', [
     ('import lmsco_ros.core', OF_EXTRAS | {'safetensors', 'torch'}),
     (TRACKER.format('hcs'), OF_EXTRAS | {'safetensors', 'torch'}),
+    (HCS_AT_WORK, OF_EXTRAS | {'safetensors', 'torch'}),
     (TRACKER.format('default'), OF_EXTRAS),
     ('import lmsco_ros.core.weights.acquisition', OF_EXTRAS),
     ('import lmsco_ros.cli.main', OF_EXTRAS | {'numpy', 'torch'}),

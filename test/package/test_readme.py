@@ -24,6 +24,7 @@ import numpy as np
 import pytest
 import yaml
 
+from lmsco_ros import core
 from msg_adapters.encodings import ALIASES, ENCODINGS
 
 REPOSITORY = Path(__file__).resolve().parents[2]
@@ -156,3 +157,16 @@ def test_links_lead_somewhere(page):
 def test_picture_is_small_enough_to_load():
     """It is shown to everybody who opens the page."""
     assert (REPOSITORY / 'docs/images/demo.png').stat().st_size < PICTURE_BYTES
+
+
+def test_all_that_the_core_exports_is_what_the_pages_name():
+    """Users import from `lmsco_ros.core`, and every name there is in the reference."""
+    pages = [REPOSITORY / 'README.md', *(REPOSITORY / 'docs').glob('*.md'),
+             *(REPOSITORY / 'examples').glob('*.py')]
+    used = {name.strip() for page in pages for names in re.findall(
+        r'from lmsco_ros\.core import (.+)', page.read_text()) for name in names.split(',')}
+    exported = set(core.__all__)
+    reference = (REPOSITORY / 'docs' / 'api.md').read_text()
+    named = set(re.findall(r'`~lmsco_ros\.core\.[\w.]+\.(\w+)`', reference))
+    errors = {name for name in exported if issubclass(getattr(core, name), core.LMSCOError)}
+    assert used <= exported and named | errors == exported
