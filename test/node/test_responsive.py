@@ -67,7 +67,7 @@ def test_all_leaves_images_with_the_middleware_while_there_is_no_room(run):
     sent = [running.graph.image(number) for number in range(30)]
     for image in sent:
         images.publish(image)
-    running.graph.spin_until(lambda: waiting(running) == 3)
+    running.graph.spin_until(lambda: running.fake.calls and waiting(running) == 3)
     assert_answers(running, health)
     assert waiting(running) == 3 and len(running.fake.calls) == 1
     running.fake.gate.set()
