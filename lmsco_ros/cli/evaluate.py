@@ -26,6 +26,7 @@ import typer
 
 from lmsco_ros.cli.console import (
     fail, frame_progress, MISUSED, plain_errors, say, show_table, telling_what_is_kept, warn)
+from lmsco_ros.cli.options import MOST_FRAMES
 from lmsco_ros.extras import require_extra
 
 if TYPE_CHECKING:
@@ -80,7 +81,8 @@ def evaluate(
     sequences: Annotated[str, typer.Option(
         help='Pattern of names, such as "vot_tir/*" or "bird*".')] = '*',
     frames: Annotated[int | None, typer.Option(
-        min=2, show_default=False, help='Only the first N frames of each sequence.')] = None,
+        min=2, max=MOST_FRAMES, show_default=False,
+        help='Only the first N frames of each sequence.')] = None,
     jobs: Annotated[int, typer.Option(
         min=1, help='Number of single-threaded processes.')] = 1,
     split: SplitOption = None,

@@ -47,6 +47,9 @@ def parse_box(text: str) -> Box:
     return Box(*numbers)
 
 
+# At a thousand a second, these take eleven days.
+MOST_FRAMES = 10 ** 9
+
 SourceArgument = Annotated[Path, typer.Argument(
     exists=True, show_default=False,
     help='Folder of images, TIFF stack, video file, or bag (rosbag2 or ROS 1).')]
@@ -63,4 +66,4 @@ ConfigOption = Annotated[Path | None, typer.Option(
     '--config', exists=True, dir_okay=False, show_default=False,
     help='YAML file with a tracker configuration, in place of the preset.')]
 FramesOption = Annotated[int | None, typer.Option(
-    '--frames', min=1, show_default=False, help='Only the first N frames.')]
+    '--frames', min=1, max=MOST_FRAMES, show_default=False, help='Only the first N frames.')]

@@ -104,6 +104,8 @@ def test_configuration_that_is_none_is_named(lmsco, tmp_path, scene_folder, star
     (('--init', '10,10,20,20', '--config', 'missing.yaml'), 2, 'does not exist'),
     (('--init', '10,10,20,20', '--topic', 'image'), 1, 'is not a bag'),
     (('--init', '900,10,20,20'), 1, '900'),
+    (('--init', '10,10,20,20', '--frames', '0'), 2, 'equal to 1'),
+    (('--init', '10,10,20,20', '--frames', '9' * 20), 2, 'equal to 1000000000'),
 ])
 def test_errors_are_one_clear_line(lmsco, tmp_path, scene_folder, arguments, code, words):
     outcome = lmsco('track', scene_folder, '--output', tmp_path / 'run', *arguments)
