@@ -16,7 +16,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 import functools
 from typing import Any
 
@@ -141,9 +141,14 @@ class GuardedNode(LifecycleNode):
                 return refusal(kind, request,
                                self.faults.note(f'a request to {name}', error))
         judges: dict[Any, Callable[[Answer], Answer]] = {
-            ChangeState: self._change_if_possible, SetParameters: set_each,
-            SetParametersAtomically: set_together}
+            ChangeState: self._change_if_possible,
+            SetParameters: functools.partial(set_each, known=self._known_parameters),
+            SetParametersAtomically: functools.partial(
+                set_together, known=self._known_parameters)}
         return judges[kind](answer) if kind in judges else answer
+
+    def _known_parameters(self) -> Collection[str]:
+        return self.get_parameters_by_prefix('')
 
     def _change_if_possible(self, change: Answer) -> Answer:
         """Return the callback of change_state so that it refuses what is not possible now."""

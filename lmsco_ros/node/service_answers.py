@@ -16,7 +16,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Collection, Iterable
 import functools
 from typing import Any
 
@@ -26,7 +26,10 @@ from rcl_interfaces.msg import SetParametersResult
 from rcl_interfaces.srv import SetParameters, SetParametersAtomically
 from rclpy.parameter import Parameter
 
+from lmsco_ros.node.parameter_files import unknown
+
 Answer = Callable[[Any, Any], Any]
+Known = Callable[[], Collection[str]]
 
 
 def refusal(kind: Any, request: Any, reason: str) -> Any:
@@ -54,14 +57,14 @@ def refusal(kind: Any, request: Any, reason: str) -> Any:
     return response
 
 
-def set_each(answer: Answer) -> Answer:
+def set_each(answer: Answer, known: Known) -> Answer:
     """Return the callback of set_parameters so that every parameter is judged by itself."""
     @functools.wraps(answer)
     def set_parameters(request: SetParameters.Request,
                        response: SetParameters.Response) -> SetParameters.Response:
         for parameter in request.parameters:
             one = SetParameters.Request(parameters=[parameter])
-            reason = _objection([parameter])
+            reason = _objection([parameter], known())
             answered = refusal(SetParameters, one, reason) if reason \
                 else answer(one, SetParameters.Response())
             response.results.extend(answered.results)
@@ -69,13 +72,13 @@ def set_each(answer: Answer) -> Answer:
     return set_parameters
 
 
-def set_together(answer: Answer) -> Answer:
+def set_together(answer: Answer, known: Known) -> Answer:
     """Return the callback of set_parameters_atomically so that rclpy can judge them all."""
     @functools.wraps(answer)
     def set_parameters(
             request: SetParametersAtomically.Request,
             response: SetParametersAtomically.Response) -> SetParametersAtomically.Response:
-        reason = _objection(request.parameters)
+        reason = _objection(request.parameters, known())
         return refusal(SetParametersAtomically, request, reason) if reason \
             else answer(request, response)
     return set_parameters
@@ -106,13 +109,15 @@ def transition_objection(transition: Transition, state: str,
             + (expected or 'none, start the node anew'))
 
 
-def _objection(parameters: Iterable[ParameterMessage]) -> str:
+def _objection(parameters: Iterable[ParameterMessage], names: Collection[str]) -> str:
     """Name what no parameter can be; empty when rclpy may judge them."""
-    known = [kind.value for kind in Parameter.Type]
+    types = [kind.value for kind in Parameter.Type]
     for parameter in parameters:
         if not parameter.name:
             return 'a parameter without a name cannot be set; expected one of those listed'
-        if parameter.value.type not in known:
+        if parameter.value.type not in types:
             return (f'{parameter.name}: {parameter.value.type} is no type of a value; expected '
-                    f'{min(known)} to {max(known)}, see rcl_interfaces/msg/ParameterType')
+                    f'{min(types)} to {max(types)}, see rcl_interfaces/msg/ParameterType')
+        if parameter.name not in names:
+            return unknown([parameter.name], names)[0]
     return ''

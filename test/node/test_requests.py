@@ -16,6 +16,7 @@
 
 from functools import partial
 import math
+import re
 import threading
 
 from diagnostic_msgs.msg import DiagnosticArray
@@ -135,6 +136,21 @@ def test_wrong_parameters_are_refused_with_a_reason(graph, wrong):
     result = graph.call(SetParametersAtomically, 'lmsco_tracker/set_parameters_atomically',
                         parameters=[wrong]).result
     assert not result.successful and result.reason
+
+
+@pytest.mark.parametrize('name, words', [
+    ('overlay_lable', 'overlay_lable is unknown.*did you mean overlay_label'),
+    ('x' * 10 ** 5, 'x is unknown.*config/tracker.yaml lists all'),
+    ('radiometrisch/größe', 'größe is unknown')], ids=['near', 'long', 'strange'])
+def test_unknown_parameter_is_named_with_the_nearest(graph, name, words):
+    graph.start_tracker()
+    wrong = parameter(name, ParameterType.PARAMETER_STRING, string_value='x')
+    result, = graph.call(SetParameters, 'lmsco_tracker/set_parameters',
+                         parameters=[wrong]).results
+    assert not result.successful and re.search(words, result.reason)
+    result = graph.call(SetParametersAtomically, 'lmsco_tracker/set_parameters_atomically',
+                        parameters=[wrong]).result
+    assert not result.successful and re.search(words, result.reason)
 
 
 @pytest.mark.parametrize('kind, name, method', [
