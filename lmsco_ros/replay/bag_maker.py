@@ -18,6 +18,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from pathlib import Path
+import re
 import sys
 
 import numpy as np
@@ -34,6 +35,8 @@ from lmsco_ros.replay.storage import Storage
 
 _ENCODINGS = {(np.dtype(np.uint8), 2): 'mono8', (np.dtype(np.uint16), 2): 'mono16',
               (np.dtype(np.float32), 2): '32FC1', (np.dtype(np.uint8), 3): 'bgr8'}
+_TOPIC = re.compile(r'(/[A-Za-z_][A-Za-z0-9_]*)+')
+_LONGEST_TOPIC = 247
 
 
 def make_bag(frames: Iterable[RecordedFrame], path: Path, *, topic: str, frame_id: str,
@@ -85,18 +88,30 @@ def write_frames(frames: Iterable[RecordedFrame], output: BagOutput, *, topic: s
     Raises
     ------
     OutputError
-        When the bag cannot be created or written.
+        When the bag cannot be created or written, or the topic is none that ROS can play.
 
     """
+    name = _full_topic(topic)
     store = get_typestore(Stores.ROS2_JAZZY)
     with output:
-        connection = output.add_connection('/' + topic.lstrip('/'), RAW, typestore=store)
+        connection = output.add_connection(name, RAW, typestore=store)
         for frame in frames:
             stamp = start_ns + frame.stamp_ns
             message = image_message(store, frame.image, stamp, frame_id)
             output.write(connection, stamp, store.serialize_cdr(message, RAW))
             output.keep_from_now_on()
     return output.count
+
+
+def _full_topic(topic: str) -> str:
+    """Return the name of a topic from its root on."""
+    name = '/' + topic.lstrip('/')
+    if not _TOPIC.fullmatch(name) or len(name) > _LONGEST_TOPIC:
+        raise OutputError(
+            f'"{topic[:_LONGEST_TOPIC]}" is no name of a topic; expected names of letters, digits '
+            'and underscores between slashes, none of which begins with a digit, and at most '
+            f'{_LONGEST_TOPIC} characters')
+    return name
 
 
 def image_message(store: Typestore, image: npt.NDArray, stamp_ns: int, frame_id: str) -> object:

@@ -83,6 +83,15 @@ def test_stamp_that_no_message_holds(tmp_path, stamp):
     assert not list(tmp_path.iterdir())
 
 
+@pytest.mark.parametrize('topic', ['', '/', 'two words', '/a//b', 'a/', '1st', 'größe', 'a\n',
+                                   '~/image', 'a' * 247])
+def test_topic_that_ros_cannot_play(tmp_path, topic):
+    with pytest.raises(OutputError, match='is no name of a topic; expected names of letters'):
+        make_bag([RecordedFrame(0, 1, np.zeros((4, 4), np.uint8))], tmp_path / 'bag',
+                 topic=topic, frame_id='', storage=Storage.MCAP, start_ns=0)
+    assert not list(tmp_path.iterdir())
+
+
 def test_image_without_an_encoding(tmp_path):
     with pytest.raises(OutputError, match='float64'):
         make_bag([RecordedFrame(0, 1, np.zeros((4, 4)))], tmp_path / 'bag', topic='i', frame_id='',
