@@ -15,7 +15,7 @@
 """
 The process of `benchmarks.before_after` that tracks with the core of one checkout.
 
-Run by its path, with that checkout first in PYTHONPATH: all imports are those of the checkout.
+Run by its path in a checkout that is first in PYTHONPATH: all imports are those of the checkout.
 It tracks through the clip in a file, one frame for each line on standard input, and answers with
 the processor time of the update and of its stages, in seconds, as a line of JSON.
 """

@@ -45,8 +45,8 @@ def test_frames_of_a_checkout_hold_their_stages():
 
 
 def test_folder_without_a_core_is_an_error(tmp_path, capfd):
-    """The tracker's process says why, and its end does not go unnoticed."""
-    with pytest.raises(RuntimeError, match='ended with status 1'):
+    """Python says that there is no such program, and its end does not go unnoticed."""
+    with pytest.raises(RuntimeError, match='ended with status 2'):
         before_after.measure([tmp_path], 'default', moving_scene((320, 256), 30, 3))
 
 
