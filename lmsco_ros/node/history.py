@@ -79,8 +79,7 @@ class FrameHistory(Generic[F]):
     def add(self, frame: F) -> None:
         """Append the newest frame; when time went backwards, forget the others."""
         if self._kept and frame.stamp < self.last.stamp:
-            self._kept.clear()
-            self._taken = 0
+            self.clear()
         self._kept.append(frame)
         self._taken += frame.nbytes
         while len(self._kept) > 1 and self._is_too_much():
@@ -91,6 +90,11 @@ class FrameHistory(Generic[F]):
         if frame in self._kept:
             self._kept.remove(frame)
             self._taken -= frame.nbytes
+
+    def clear(self) -> None:
+        """Forget all frames."""
+        self._kept.clear()
+        self._taken = 0
 
     def since(self, stamp: int) -> list[F]:
         """Return the frame with that very stamp and all later ones, or an empty list."""

@@ -88,9 +88,10 @@ class Mailbox(ABC, Generic[T]):
         """Tell whether a frame put now may be dropped while late items wait before it."""
 
     def close(self) -> None:
-        """Wake everybody who waits; nothing is handed out from now on."""
+        """Wake whoever waits, and forget what waits; nothing is handed out from now on."""
         with self._changed:
             self._closed = True
+            self._items.clear()
             self._changed.notify_all()
 
     def _taken(self, left: int) -> None:

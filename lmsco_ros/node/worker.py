@@ -128,6 +128,9 @@ class TrackerWorker:
         """
         self._stopping.set()
         self._mailbox.close()
+        with self._intake:
+            # Who refers to whom here goes in circles: it may take long until they are collected.
+            self._history.clear()
         if self._thread.ident is not None:
             self._thread.join(timeout)
         return not self._thread.is_alive()

@@ -20,6 +20,7 @@ import subprocess
 import sys
 import threading
 import time
+import weakref
 
 from hypothesis import given, strategies as st
 import numpy as np
@@ -206,6 +207,18 @@ def test_nothing_is_delivered_after_stop(bench):
     b.tracker.gate.set()
     assert b.worker.stop(timeout=PATIENCE)
     assert not b.outcomes
+
+
+def test_stop_frees_the_images(bench):
+    b = bench(BoundedMailbox(50, int))
+    b.hold()
+    b.worker.initialize(BOX)
+    b.frame(0)
+    b.stuck()
+    waiting = weakref.ref(b.frame(1))
+    assert waiting() is not None
+    b.worker.stop(timeout=0.05)
+    assert waiting() is None
 
 
 def test_stop_before_start_and_twice():
