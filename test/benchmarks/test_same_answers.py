@@ -158,7 +158,7 @@ def test_command_tells_what_differs_and_its_status_says_so(
         sequences = [sequence]
 
     monkeypatch.setattr(same_answers, 'scan_dataset', lambda folder: Found)
-    monkeypatch.setattr(same_answers, 'load_split', Split)
+    monkeypatch.setattr(same_answers, 'load_split', lambda path: Split())
     before = other_checkout if status else REPOSITORY
     assert same_answers.main(['DATA', '--before', str(before), '--preset', 'hcs',
                               '--part', 'val', '--frames', '3']) == status
