@@ -22,12 +22,13 @@ from lmsco_ros.core.backend import Backend
 from lmsco_ros.core.config import TrackerConfig
 from lmsco_ros.core.detection.detector import Detection, Detector
 from lmsco_ros.core.detection.scale import make_scale_estimator
+from lmsco_ros.core.extent.fusion import ExtentFilter
+from lmsco_ros.core.extent.measurement import ExtentMeter
 from lmsco_ros.core.extent.size import steady
 from lmsco_ros.core.fourier.localization import centered_map
 from lmsco_ros.core.imaging.gain import AutomaticGain
 from lmsco_ros.core.imaging.regions import check_box, clamp_box, visible_part
 from lmsco_ros.core.imaging.view import FrameView
-from lmsco_ros.core.presence.comparison import Comparison
 from lmsco_ros.core.presence.monitor import PresenceMonitor
 from lmsco_ros.core.presence.observer import Observer, Outlook, Sighting
 from lmsco_ros.core.search.prediction import Prediction
@@ -36,6 +37,10 @@ from lmsco_ros.core.types import BoundingBox, TrackResult, TrackState
 from lmsco_ros.core.weights.loading import Networks
 
 __all__ = ['Track']
+import os
+MODE=os.environ.get('MODE','1')=='1'
+SPARE=os.environ.get('SPARE','0')=='1'
+ANCHOR=os.environ.get('ANCHOR','1')=='1'
 
 
 class Track:
@@ -77,9 +82,10 @@ class Track:
         self._detector = Detector(config, backend, networks, view, box)
         first = self._detector(view, box)
         self._first_peak = first.peak.value
-        comparison = Comparison(networks.comparison, view, box) if networks.comparison else None
+        meter = ExtentMeter(networks.extent, view, box) if networks.extent else None
+        self._extent = ExtentFilter(box, view.size)
         self._monitor = PresenceMonitor(config.presence)
-        self._observer = Observer(self._detector, comparison, self._monitor, first)
+        self._observer = Observer(self._detector, meter, self._monitor, first)
         self._prediction = Prediction()
         self._redetection = Redetection(config.search, self._observer, self._monitor, view, box)
         self._scale = make_scale_estimator(config.scale, box.size)
@@ -128,7 +134,7 @@ class Track:
 
     def _look(self, outlook: Outlook) -> Sighting:
         """Return what is where the target is expected; frames that train spare the comparison."""
-        spared = self._trains and self._config.learning.update_interval > 1
+        spared = self._trains and self._config.learning.update_interval > 1 and SPARE
         return self._observer.look(outlook, self._scale.search_factors,
                                    self._presence if spared else None)
 
@@ -140,6 +146,8 @@ class Track:
     def _resized(self, view: FrameView, sighting: Sighting) -> BoundingBox:
         """Return the box at a sighting, in the size of the target there."""
         detection = sighting.detection
+        if MODE:
+            return clamp_box(self._extent(sighting.box, detection.center, sighting.measurement), view.size)
         searched = self._scale.found_factor(detection.peak.scale_values)
         moved = clamp_box(sighting.box.moved_to(detection.center).scaled(searched), view.size)
         return clamp_box(moved.scaled(self._scale.estimate(view, moved)), view.size)
@@ -159,7 +167,7 @@ class Track:
 
     def _learn(self, view: FrameView, detection: Detection) -> None:
         """Store the sample; when it is time, train the filter and the scale estimator."""
-        self._detector.remember(detection)
+        self._detector.remember(detection, self._box.center if ANCHOR else None)
         if self._trains:
             self._detector.train()
             self._scale.learn(view, self._box)
@@ -167,6 +175,6 @@ class Track:
     def _describe(self, view: FrameView, detection: Detection, score: float,
                   state: TrackState) -> TrackResult:
         """Return what there is to say; the target in the first frame scores 1 in the map."""
-        box = steady(self._box, self._first_size, self._config.scale.tolerance)
+        box = self._box if MODE else steady(self._box, self._first_size, self._config.scale.tolerance)
         return TrackResult(visible_part(box, view.size), score, state,
                            centered_map(detection.peak.grid / self._first_peak), detection.region)

@@ -14,18 +14,18 @@
 
 """Configuration of the tracker: one module for each section, and the presets."""
 
-from lmsco_ros.core.config.extent import ScaleConfig
+from lmsco_ros.core.config.extent import ExtentConfig, ScaleConfig
 from lmsco_ros.core.config.features import (
     ChannelConfig, FeatureConfig, MotionConfig, NETWORK_KINDS, NetworkConfig)
 from lmsco_ros.core.config.imaging import IntensityConfig, SamplingConfig
 from lmsco_ros.core.config.learning import LearningConfig
-from lmsco_ros.core.config.presence import ComparisonConfig, PresenceConfig
+from lmsco_ros.core.config.presence import PresenceConfig
 from lmsco_ros.core.config.runtime import RuntimeConfig
 from lmsco_ros.core.config.search import SearchConfig
 from lmsco_ros.core.config.tracker import TrackerConfig
 
 __all__ = [
-    'ChannelConfig', 'ComparisonConfig', 'FeatureConfig', 'IntensityConfig', 'LearningConfig',
+    'ChannelConfig', 'ExtentConfig', 'FeatureConfig', 'IntensityConfig', 'LearningConfig',
     'MotionConfig', 'NETWORK_KINDS', 'NetworkConfig', 'PresenceConfig', 'RuntimeConfig',
     'SamplingConfig', 'ScaleConfig', 'SearchConfig', 'TrackerConfig',
 ]

@@ -21,9 +21,24 @@ from dataclasses import dataclass
 from lmsco_ros.core.config.validation import check_choice, check_range
 from lmsco_ros.core.errors import ConfigError
 
-__all__ = ['ScaleConfig']
+__all__ = ['ExtentConfig', 'ScaleConfig']
 
 _LARGEST_SCALE = 4.0
+
+
+@dataclass(frozen=True)
+class ExtentConfig:
+    """
+    The network that measures the extent of what is found, and knows the target of the start.
+
+    Attributes
+    ----------
+    network : str
+        Name of its weights; empty for none, and a size that follows the scale estimator alone.
+
+    """
+
+    network: str = ''
 
 
 @dataclass(frozen=True)

@@ -20,22 +20,7 @@ from dataclasses import dataclass
 
 from lmsco_ros.core.config.validation import check_choice, check_range
 
-__all__ = ['ComparisonConfig', 'PresenceConfig']
-
-
-@dataclass(frozen=True)
-class ComparisonConfig:
-    """
-    Siamese comparison of what is found with the first frame.
-
-    Attributes
-    ----------
-    network : str
-        Name of the weights of the network that compares; empty for no comparison.
-
-    """
-
-    network: str = ''
+__all__ = ['PresenceConfig']
 
 
 @dataclass(frozen=True)

@@ -24,11 +24,11 @@ from collections.abc import Mapping
 from types import MappingProxyType
 from typing import Any
 
-from lmsco_ros.core.config.extent import ScaleConfig
+from lmsco_ros.core.config.extent import ExtentConfig, ScaleConfig
 from lmsco_ros.core.config.features import ChannelConfig, FeatureConfig, NetworkConfig
 from lmsco_ros.core.config.imaging import SamplingConfig
 from lmsco_ros.core.config.learning import LearningConfig
-from lmsco_ros.core.config.presence import ComparisonConfig, PresenceConfig
+from lmsco_ros.core.config.presence import PresenceConfig
 from lmsco_ros.core.config.search import SearchConfig
 
 __all__ = ['HANDCRAFTED', 'PRESETS']
@@ -48,7 +48,7 @@ _DEFAULT: Mapping[str, Any] = {
     'scale': ScaleConfig(step=1.03, exponent_min=-5, exponent_max=5, learning_rate=0.3,
                          slow_share=0.3, model_area=1024.0, label_sigma=1.5,
                          damping=20.0, tolerance=0.5),
-    'comparison': ComparisonConfig('comparison'),
+    'extent': ExtentConfig('extent'),
 }
 _PAPER: Mapping[str, Any] = {
     'features': _APPEARANCE + _MOTION,

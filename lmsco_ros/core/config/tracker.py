@@ -24,11 +24,11 @@ from typing import Any
 
 import yaml
 
-from lmsco_ros.core.config.extent import ScaleConfig
+from lmsco_ros.core.config.extent import ExtentConfig, ScaleConfig
 from lmsco_ros.core.config.features import FeatureConfig, MotionConfig, NetworkConfig
 from lmsco_ros.core.config.imaging import IntensityConfig, SamplingConfig
 from lmsco_ros.core.config.learning import LearningConfig
-from lmsco_ros.core.config.presence import ComparisonConfig, PresenceConfig
+from lmsco_ros.core.config.presence import PresenceConfig
 from lmsco_ros.core.config.presets import HANDCRAFTED, PRESETS
 from lmsco_ros.core.config.runtime import RuntimeConfig
 from lmsco_ros.core.config.search import SearchConfig
@@ -50,7 +50,7 @@ class TrackerConfig:
     ----------
     features : tuple of FeatureConfig
         Feature blocks.
-    intensity, sampling, networks, motion, learning, scale, comparison, presence, search, runtime
+    intensity, sampling, networks, motion, learning, scale, extent, presence, search, runtime
         Sections, described in their classes.
 
     Raises
@@ -67,7 +67,7 @@ class TrackerConfig:
     motion: MotionConfig = MotionConfig()
     learning: LearningConfig = LearningConfig()
     scale: ScaleConfig = ScaleConfig()
-    comparison: ComparisonConfig = ComparisonConfig()
+    extent: ExtentConfig = ExtentConfig()
     presence: PresenceConfig = PresenceConfig()
     search: SearchConfig = SearchConfig()
     runtime: RuntimeConfig = RuntimeConfig()

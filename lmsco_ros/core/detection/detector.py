@@ -79,9 +79,10 @@ class Detection:
         x, y = self.region.center
         return ((position[1] - y) / self.region.height, (position[0] - x) / self.region.width)
 
-    def recentered_sample(self) -> list[Array]:
+    def recentered_sample(self, center=None) -> list[Array]:
         """Return the sample with the target at the origin."""
-        return [shift(series, self.peak.displacement) for series in self.sample]
+        d = self.peak.displacement if center is None else self.displacement_to(center)
+        return [shift(series, d) for series in self.sample]
 
 
 class Detector:
@@ -183,9 +184,9 @@ class Detector:
             region = region_around(box, self._config.sampling)
             self._motion.remember(region, self._patch(view, region))
 
-    def remember(self, detection: Detection) -> None:
+    def remember(self, detection: Detection, center=None) -> None:
         """Take the detection as a further training sample."""
-        self._operator.remember(detection.recentered_sample())
+        self._operator.remember(detection.recentered_sample(center))
 
     def train(self) -> None:
         """Adapt the filter to the samples."""

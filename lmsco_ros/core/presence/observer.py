@@ -22,7 +22,7 @@ import math
 
 from lmsco_ros.core.detection.detector import Detection, Detector
 from lmsco_ros.core.imaging.view import FrameView
-from lmsco_ros.core.presence.comparison import Comparison
+from lmsco_ros.core.extent.measurement import ExtentMeter, Measurement
 from lmsco_ros.core.presence.distractors import Distractors
 from lmsco_ros.core.presence.evidence import Assessment, Evidence
 from lmsco_ros.core.presence.monitor import PresenceMonitor
@@ -65,12 +65,15 @@ class Sighting:
         What the filter saw there.
     assessment : Assessment
         What speaks for it.
+    measurement : Measurement or None
+        Its extent; None where nothing measures, or where this was spared.
 
     """
 
     box: BoundingBox
     detection: Detection
     assessment: Assessment
+    measurement: Measurement | None
 
 
 class Observer:
@@ -81,8 +84,8 @@ class Observer:
     ----------
     detector : Detector
         Of the target.
-    comparison : Comparison or None
-        With the first frame; None where nothing is compared.
+    meter : ExtentMeter or None
+        Measures the extent, and knows the target of the first frame.
     monitor : PresenceMonitor
         Weighs the evidence.
     first : Detection
@@ -90,10 +93,10 @@ class Observer:
 
     """
 
-    def __init__(self, detector: Detector, comparison: Comparison | None,
+    def __init__(self, detector: Detector, meter: ExtentMeter | None,
                  monitor: PresenceMonitor, first: Detection) -> None:
         self._detector = detector
-        self._comparison = comparison
+        self._meter = meter
         self._monitor = monitor
         self._distractors = Distractors()
         self._first_likeness = detector.likeness(first)
@@ -119,7 +122,7 @@ class Observer:
         if self.is_distractor(outlook, detection):
             detection = self._detector.near(detection, outlook.expected.center)
         if presence is not None:
-            as_before = self._sighting(outlook, detection, outlook.expected, presence)
+            as_before = self._sighting(outlook, detection, outlook.expected, presence, None)
             if self._monitor.beyond_doubt(as_before.assessment):
                 return as_before
         return self.weigh(outlook, detection, outlook.expected)
@@ -130,9 +133,10 @@ class Observer:
 
     def weigh(self, outlook: Outlook, detection: Detection, box: BoundingBox) -> Sighting:
         """Return a detection around a box, compared with the first frame."""
-        presence = None if self._comparison is None else self._comparison(
+        measurement = None if self._meter is None else self._meter(
             outlook.view, box.moved_to(detection.center))
-        return self._sighting(outlook, detection, box, presence)
+        presence = None if measurement is None else measurement.presence
+        return self._sighting(outlook, detection, box, presence, measurement)
 
     def is_distractor(self, outlook: Outlook, detection: Detection) -> bool:
         """Return whether something else than the target was detected; if so, note its place."""
@@ -158,9 +162,9 @@ class Observer:
         return self._monitor.resembles(self.weigh(outlook, seen, box).assessment.evidence)
 
     def _sighting(self, outlook: Outlook, detection: Detection, box: BoundingBox,
-                  presence: float | None) -> Sighting:
+                  presence: float | None, measurement: Measurement | None) -> Sighting:
         """Return a detection around a box with all that speaks for it."""
         likeness = self._detector.likeness(detection) / self._first_likeness
         jump = math.dist(detection.center, outlook.expected.center) / outlook.expected.area**0.5
         evidence = Evidence(detection.sharpness, likeness, presence, jump)
-        return Sighting(box, detection, self._monitor.assess(evidence))
+        return Sighting(box, detection, self._monitor.assess(evidence), measurement)

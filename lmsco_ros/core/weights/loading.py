@@ -24,7 +24,7 @@ from lmsco_ros.core.config import NETWORK_KINDS, TrackerConfig
 
 if TYPE_CHECKING:
     from lmsco_ros.core.networks.backbone import Backbone
-    from lmsco_ros.core.networks.comparison import ComparisonNet
+    from lmsco_ros.core.networks.extent import ExtentNet
 
 __all__ = ['load_networks', 'Networks']
 
@@ -38,14 +38,14 @@ class Networks:
     ----------
     appearance, motion : Backbone or None
         Behind the feature channels of that kind.
-    comparison : ComparisonNet or None
-        Compares the target with its first frame.
+    extent : ExtentNet or None
+        Measures the extent of a target.
 
     """
 
     appearance: Backbone | None = None
     motion: Backbone | None = None
-    comparison: ComparisonNet | None = None
+    extent: ExtentNet | None = None
 
 
 def load_networks(config: TrackerConfig) -> Networks:
@@ -62,8 +62,8 @@ def load_networks(config: TrackerConfig) -> Networks:
               'motion': config.networks.motion_backbone}
     used = {group.kind for block in config.features for group in block.channels}
     names = {kind: wanted[kind] for kind in NETWORK_KINDS if kind in used}
-    if config.comparison.network:
-        names['comparison'] = config.comparison.network
+    if config.extent.network:
+        names['extent'] = config.extent.network
     if not names:
         return Networks()
     from lmsco_ros.core.weights.store import load_backbone
@@ -71,4 +71,4 @@ def load_networks(config: TrackerConfig) -> Networks:
     folder = Path(config.networks.directory) if config.networks.directory else None
     found = {kind: load_backbone(name, folder) for kind, name in names.items()}
     return Networks(found.get('appearance'), found.get('motion'),
-                    cast('ComparisonNet | None', found.get('comparison')))
+                    cast('ExtentNet | None', found.get('extent')))

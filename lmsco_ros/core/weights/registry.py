@@ -20,7 +20,7 @@ from dataclasses import dataclass
 
 from lmsco_ros.core.errors import WeightsError
 from lmsco_ros.core.networks.backbone import Backbone
-from lmsco_ros.core.networks.comparison import ComparisonNet
+from lmsco_ros.core.networks.extent import ExtentNet
 from lmsco_ros.core.networks.motion_cnn import MotionCNN
 from lmsco_ros.core.networks.squeezenet import SqueezeNet
 from lmsco_ros.core.networks.thermal import ThermalFlowNet, ThermalNet
@@ -84,11 +84,11 @@ WEIGHTS = (
         file_name='thermal_flow.safetensors',
         bundled=True),
     WeightsSource(
-        name='comparison',
-        purpose='whether a target of the first frame is there, trained here',
-        architecture=ComparisonNet,
+        name='extent',
+        purpose='extent of a target, and whether it is there, trained here',
+        architecture=ExtentNet,
         license='Apache-2.0',
-        file_name='comparison.safetensors',
+        file_name='extent.safetensors',
         bundled=True),
     WeightsSource(
         name='vgg_m_2048',

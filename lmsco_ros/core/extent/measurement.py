@@ -1,0 +1,127 @@
+# Copyright 2026 lmsco_ros contributors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""What a network measures of a target: its four edges, how sure they are, whether it is there."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from lmsco_ros.core.imaging.view import FrameView
+from lmsco_ros.core.types import BoundingBox
+
+if TYPE_CHECKING:
+    import torch
+
+    from lmsco_ros.core.networks.extent import ExtentNet
+
+__all__ = ['ExtentMeter', 'Measurement']
+
+
+@dataclass(frozen=True)
+class Measurement:
+    """
+    The extent of a target in one frame.
+
+    Attributes
+    ----------
+    edges : ndarray, shape (2, 2)
+        Left and right, upper and lower edge of what is seen of the target, in image pixels.
+    deviations : ndarray, shape (2, 2)
+        Standard deviations of their errors in pixels.
+    presence : float
+        Log-odds that the target of the first frame is there.
+
+    """
+
+    edges: np.ndarray
+    deviations: np.ndarray
+    presence: float
+
+    @property
+    def box(self) -> BoundingBox:
+        """What is seen of the target."""
+        (left, right), (top, bottom) = self.edges.tolist()
+        return BoundingBox(left, top, right - left, bottom - top)
+
+
+class ExtentMeter:
+    """
+    Measures targets like the one of the first frame, which never changes.
+
+    Parameters
+    ----------
+    network : ExtentNet
+        What measures.
+    view : FrameView
+        First frame.
+    box : BoundingBox
+        The target in it.
+
+    """
+
+    def __init__(self, network: ExtentNet, view: FrameView, box: BoundingBox) -> None:
+        self._network = network
+        self._first_side = math.log2(_side(box))
+        self._reference = network.reference(network.encode(self._patch(view, box)))
+
+    def __call__(self, view: FrameView, box: BoundingBox) -> Measurement:
+        """
+        Return the extent of the target.
+
+        Parameters
+        ----------
+        view : FrameView
+            A frame.
+        box : BoundingBox
+            Where the target is expected, and how large.
+
+        """
+        answer = self._network.relate(self._reference, self._network.encode(
+            self._patch(view, box)), (self._first_side, math.log2(_side(box))))
+        unit = self._network.context * _side(box) / 2
+        expected = np.array([[box.x, box.x + box.width], [box.y, box.y + box.height]])
+        # The network speaks of left, top, right, bottom, and of Laplace distributions.
+        edges = np.sort(expected + unit * answer[:4].reshape(2, 2).T, axis=1)
+        deviations = math.sqrt(2) * unit * np.exp(answer[4:8].reshape(2, 2).T)
+        return Measurement(edges, deviations, float(answer[8]))
+
+    def _patch(self, view: FrameView, box: BoundingBox) -> np.ndarray:
+        """Return what the network sees of a box, shape (3, size, size)."""
+        size = self._network.size
+        side = self._network.context * _side(box)
+        region = BoundingBox.from_center(box.center, (side, side))
+        image = BoundingBox(0, 0, *view.size)
+        return np.stack([view.patch(region, (size, size)), _covered(region, box, size),
+                         _covered(region, image, size)])
+
+
+def _side(box: BoundingBox) -> float:
+    """Return the side of a square as large as a box, in pixels."""
+    return math.sqrt(box.area)
+
+
+def _covered(region: BoundingBox, box: BoundingBox, size: int) -> np.ndarray:
+    """Return how much of each pixel of a patch of a region a box covers, shape (size, size)."""
+    spans = []
+    for start, length, low, high in (
+            (region.y, region.height, box.y, box.y + box.height),
+            (region.x, region.width, box.x, box.x + box.width)):
+        lines = np.clip(np.linspace(start, start + length, size + 1), low, high)
+        spans.append(np.diff(lines) * (size / length))
+    return np.outer(*spans).astype(np.float32)
