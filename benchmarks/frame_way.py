@@ -50,8 +50,8 @@ STEPS = (
      'features/extractor.py, fourier/interpolation.py'),
     ('5  score', 'channels times filter, summed; its peak is the place',
      'learning/memory.py, fourier/localization.py'),
-    ('6  box', 'judged, resized, told',
-     'presence/monitor.py, detection/scale.py, extent/size.py'),
+    ('6  box', 'judged, measured, fused, told',
+     'presence/monitor.py, extent/measurement.py, extent/fusion.py'),
 )
 TARGET, REGION = '#00c060', '#ffb000'
 

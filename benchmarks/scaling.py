@@ -221,11 +221,11 @@ def memory_points(config: TrackerConfig) -> list[Point]:
         for count in MEMORIES]
 
 
-def scale_points(config: TrackerConfig, estimator: str) -> list[Point]:
+def scale_points(config: TrackerConfig) -> list[Point]:
     """Return different numbers of scales, symmetrical around the last one."""
     clip = moving_scene(IMAGE, TARGET, CLIP_FRAMES)
     return [Point(str(count), count, replace(config, scale=replace(
-        config.scale, estimator=estimator, exponent_min=-(count // 2),
+        config.scale, exponent_min=-(count // 2),
         exponent_max=count // 2)), clip) for count in SCALES]
 
 
@@ -239,10 +239,7 @@ CURVES: Mapping[str, Curve] = {
     'image': Curve('Size of the image, the same target', 'pixels of the image', image_points),
     'target': Curve('Size of the target, the same image', 'side in pixels', target_points, True),
     'memory': Curve('Samples in memory', 'samples', memory_points),
-    'search': Curve('Scales searched by the filter', 'scales',
-                    lambda config: scale_points(config, 'search')),
-    'filter': Curve('Scales of the scale filter', 'scales',
-                    lambda config: scale_points(config, 'filter')),
+    'search': Curve('Scales searched by the filter', 'scales', scale_points),
     'threads': Curve('Threads', 'threads', thread_points),
 }
 

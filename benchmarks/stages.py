@@ -78,7 +78,7 @@ class Stage:
         return owner, name
 
 
-# A stage counts its own time only: a patch taken for the scale belongs to `patch`.
+# A stage counts its own time only: a patch taken for the extent belongs to `patch`.
 STAGES = (
     Stage('gain', 'imaging.gain', 'AutomaticGain.examine'),
     Stage('patch', 'imaging.view', 'FrameView.patch'),
@@ -89,10 +89,9 @@ STAGES = (
     Stage('scores', 'learning.structured_operator', 'StructuredOperator.scores'),
     Stage('peak', 'detection.detector', 'locate'),
     Stage('sharpness', 'detection.detector', 'peak_to_sidelobe_ratio'),
-    Stage('scale', 'detection.scale', 'ScaleFilter.estimate'),
-    Stage('scale training', 'detection.scale', 'ScaleFilter.learn'),
-    Stage('comparison', 'presence.comparison', 'Comparison.__call__'),
-    Stage('sample', 'detection.detector', 'Detection.recentered_sample'),
+    Stage('extent', 'extent.measurement', 'ExtentMeter.__call__'),
+    Stage('fusion', 'extent.fusion', 'EdgeFilter.__call__'),
+    Stage('sample', 'detection.detector', 'Detection.sample_around'),
     Stage('memory', 'learning.structured_operator', 'StructuredOperator.remember'),
     Stage(TRAINING, 'learning.structured_operator', 'StructuredOperator.train'),
 )

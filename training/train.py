@@ -13,11 +13,11 @@
 # limitations under the License.
 
 """
-Train one of the bundled networks.
+Train one of the bundled feature networks.
 
     python -m training.train NETWORK --data DATA [--output FOLDER] [--minutes N] [--device NAME]
 
-NETWORK is thermal, thermal_flow or comparison; DATA holds `thermal_dev` and
+NETWORK is thermal or thermal_flow; DATA holds `thermal_dev` and
 `training_stills`. Written are NETWORK.safetensors, NETWORK_log.csv and NETWORK_curve.png.
 """
 
@@ -34,27 +34,24 @@ from matplotlib.figure import Figure
 import torch
 import yaml
 
-from lmsco_ros.core.networks.comparison import ComparisonNet
 from lmsco_ros.core.networks.thermal import ThermalFlowNet, ThermalNet
-from training.comparison import comparison_batches, ComparisonObjective
 from training.correlation_filter import CorrelationFilter
 from training.examples import ExampleSource, Spread
 from training.features import feature_batches, FeatureObjective
 from training.flow_examples import FlowSource
 from training.loop import Batch, Objective, Schedule, take, train
-from training.pairs import PairSource
 from training.sources import Clip, data_folder, load_clips, load_stills, Still
 
 CONFIG = Path(__file__).with_name('config.yaml')
 
-Source = ExampleSource | FlowSource | PairSource
+Source = ExampleSource | FlowSource
 Batches = Callable[[Source, int], Iterator[Batch]]
 
 
 def main() -> None:
     """Train the network that the command line names."""
     parser = argparse.ArgumentParser(description=__doc__.split('\n\n')[0])
-    parser.add_argument('network', choices=('thermal', 'thermal_flow', 'comparison'))
+    parser.add_argument('network', choices=('thermal', 'thermal_flow'))
     parser.add_argument('--data', type=data_folder('thermal_dev', 'training_stills'),
                         required=True)
     parser.add_argument('--output', type=Path, default=Path('training/output'))
@@ -104,8 +101,6 @@ def _parts(name: str, settings: Mapping[str, Any]) -> tuple[
         torch.nn.Module, Objective, Batches,
         Callable[[Sequence[Clip], Sequence[Still]], Source]]:
     """Return network, objective, batches of a source, and source of clips and stills."""
-    if name == 'comparison':
-        return _comparison(settings)
     correlation = CorrelationFilter(**settings['filter'])
     objective = FeatureObjective(correlation, settings['layer'], settings['core'])
     searched = Spread(**settings['searched'])
@@ -119,21 +114,6 @@ def _parts(name: str, settings: Mapping[str, Any]) -> tuple[
                 lambda clips, stills: FlowSource(clips, size, factor))
     return ThermalNet(), objective, batches, lambda clips, stills: ExampleSource(
         clips, stills, size, factor, True, settings['clip_share'], settings['bystanders'])
-
-
-def _comparison(settings: Mapping[str, Any]) -> tuple[
-        torch.nn.Module, Objective, Batches,
-        Callable[[Sequence[Clip], Sequence[Still]], Source]]:
-    """Return the parts of `_parts` for the comparison network."""
-    network = ComparisonNet()
-    present = Spread(**settings['present'])
-
-    def batches(source: Source, seed: int) -> Iterator[Batch]:
-        return comparison_batches(source, settings['batch_size'], settings['shares'], seed)
-
-    return network, ComparisonObjective(), batches, lambda clips, stills: PairSource(
-        clips, stills, network.size, network.context, settings['clip_share'], present,
-        tuple(settings['near']))
 
 
 def draw_curve(log: Path, picture: Path) -> None:

@@ -17,7 +17,7 @@ Fit the coefficients of `lmsco_ros.core.presence.trust`.
 
     python -m training.trust --data DATA [--frames N]
 
-DATA holds `thermal_dev`. Every 5th clip of the train part, which the comparison network never
+DATA holds `thermal_dev`. Every 5th clip of the train part, which the extent network never
 saw, is tracked as it is and under the challenges that take the target away, move it, or set
 another one beside it. Printed are the coefficients, and for each challenge the chance that a
 detection on the target is trusted more than one off it.
@@ -108,7 +108,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     records = {name: list(record_all(sequences, name)) for name in CHALLENGES}
     everything = [part for name, parts in records.items() if name not in COPIES
                   for part in parts]
-    for label, columns in (('COMPARED', [0, 1, 2]), ('UNCOMPARED', [0, 1])):
+    for label, columns in (('MEASURED', [0, 1, 2]), ('UNMEASURED', [0, 1])):
         weights = fit(everything, columns)
         print(label, ' '.join(f'{value:.2f}' for value in weights))
         for name, parts in records.items():

@@ -21,10 +21,9 @@ import numpy as np
 from lmsco_ros.core.backend import Backend
 from lmsco_ros.core.config import TrackerConfig
 from lmsco_ros.core.detection.detector import Detection, Detector
-from lmsco_ros.core.detection.scale import make_scale_estimator
-from lmsco_ros.core.extent.fusion import ExtentFilter
+from lmsco_ros.core.detection.scale import found_factor, scale_factors
+from lmsco_ros.core.extent.fusion import EdgeFilter
 from lmsco_ros.core.extent.measurement import ExtentMeter
-from lmsco_ros.core.extent.size import steady
 from lmsco_ros.core.fourier.localization import centered_map
 from lmsco_ros.core.imaging.gain import AutomaticGain
 from lmsco_ros.core.imaging.regions import check_box, clamp_box, visible_part
@@ -37,10 +36,6 @@ from lmsco_ros.core.types import BoundingBox, TrackResult, TrackState
 from lmsco_ros.core.weights.loading import Networks
 
 __all__ = ['Track']
-import os
-MODE=os.environ.get('MODE','1')=='1'
-SPARE=os.environ.get('SPARE','0')=='1'
-ANCHOR=os.environ.get('ANCHOR','1')=='1'
 
 
 class Track:
@@ -73,23 +68,20 @@ class Track:
                  image: np.ndarray, box: BoundingBox) -> None:
         check_box(box, (image.shape[1], image.shape[0]))
         self._config = config
-        self._box, self._first_size = box, box.size
+        self._box = box
         self._frame = 0
         self._after_shutter = False
-        self._presence: float | None = None
         self._gain = AutomaticGain(config.intensity)
         view = FrameView(image, self._gain.examine(image).intensity)
         self._detector = Detector(config, backend, networks, view, box)
         first = self._detector(view, box)
         self._first_peak = first.peak.value
         meter = ExtentMeter(networks.extent, view, box) if networks.extent else None
-        self._extent = ExtentFilter(box, view.size)
         self._monitor = PresenceMonitor(config.presence)
         self._observer = Observer(self._detector, meter, self._monitor, first)
         self._prediction = Prediction()
         self._redetection = Redetection(config.search, self._observer, self._monitor, view, box)
-        self._scale = make_scale_estimator(config.scale, box.size)
-        self._scale.learn(view, box)
+        self._extent = EdgeFilter(box, view.size)
         self._follow(view, box, TrackState.TRACKING)
         self._detector.watch(view, box)
         self.result = self._describe(view, first, 1.0, TrackState.TRACKING)
@@ -110,13 +102,12 @@ class Track:
             sighting = self._search_elsewhere(outlook, sighting)
         self._after_shutter = False
         verdict = self._monitor.judge(sighting.assessment)
-        self._presence = sighting.assessment.evidence.presence
         if verdict.believed:
-            self._follow(view, self._resized(view, sighting), verdict.state)
+            self._follow(view, self._fused(view, sighting), verdict.state)
         else:
             self._prediction.missed()
         if verdict.learns:
-            self._learn(view, sighting.detection)
+            self._learn(sighting.detection)
         self._detector.watch(view, self._expected(view))
         self.result = self._describe(view, sighting.detection, verdict.score, verdict.state)
         return self.result
@@ -133,24 +124,22 @@ class Track:
         return self._prediction.expected(self._box, view.size)
 
     def _look(self, outlook: Outlook) -> Sighting:
-        """Return what is where the target is expected; frames that train spare the comparison."""
-        spared = self._trains and self._config.learning.update_interval > 1 and SPARE
-        return self._observer.look(outlook, self._scale.search_factors,
-                                   self._presence if spared else None)
+        """Return what is where the target is expected."""
+        return self._observer.look(outlook, scale_factors(self._config.scale))
 
     def _search_elsewhere(self, outlook: Outlook, here: Sighting) -> Sighting:
         """Return what convinces most in other places of the image, or what is here."""
         return self._redetection(outlook, here, self._prediction.misses,
                                  after_shutter=self._after_shutter)
 
-    def _resized(self, view: FrameView, sighting: Sighting) -> BoundingBox:
-        """Return the box at a sighting, in the size of the target there."""
+    def _fused(self, view: FrameView, sighting: Sighting) -> BoundingBox:
+        """Return the box at a sighting, in the size that was searched and measured there."""
         detection = sighting.detection
-        if MODE:
-            return clamp_box(self._extent(sighting.box, detection.center, sighting.measurement), view.size)
-        searched = self._scale.found_factor(detection.peak.scale_values)
-        moved = clamp_box(sighting.box.moved_to(detection.center).scaled(searched), view.size)
-        return clamp_box(moved.scaled(self._scale.estimate(view, moved)), view.size)
+        factor = found_factor(self._config.scale, detection.peak.scale_values)
+        box = sighting.box.moved_to(detection.center).scaled(factor)
+        if sighting.measurement is not None:
+            box = self._extent(box, sighting.measurement)
+        return clamp_box(box, view.size)
 
     def _follow(self, view: FrameView, box: BoundingBox, state: TrackState) -> None:
         """Move to where the target is."""
@@ -160,21 +149,14 @@ class Track:
         if state is TrackState.TRACKING and self._config.presence.distractors:
             self._observer.keep(view, box)
 
-    @property
-    def _trains(self) -> bool:
-        """Whether the filter is trained in this frame."""
-        return self._frame % self._config.learning.update_interval == 0
-
-    def _learn(self, view: FrameView, detection: Detection) -> None:
-        """Store the sample; when it is time, train the filter and the scale estimator."""
-        self._detector.remember(detection, self._box.center if ANCHOR else None)
-        if self._trains:
+    def _learn(self, detection: Detection) -> None:
+        """Store the sample with the target in its middle; when it is time, train the filter."""
+        self._detector.remember(detection, self._box.center)
+        if self._frame % self._config.learning.update_interval == 0:
             self._detector.train()
-            self._scale.learn(view, self._box)
 
     def _describe(self, view: FrameView, detection: Detection, score: float,
                   state: TrackState) -> TrackResult:
         """Return what there is to say; the target in the first frame scores 1 in the map."""
-        box = self._box if MODE else steady(self._box, self._first_size, self._config.scale.tolerance)
-        return TrackResult(visible_part(box, view.size), score, state,
+        return TrackResult(visible_part(self._box, view.size), score, state,
                            centered_map(detection.peak.grid / self._first_peak), detection.region)

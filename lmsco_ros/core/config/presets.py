@@ -45,20 +45,17 @@ _DEFAULT: Mapping[str, Any] = {
                                 *HANDCRAFTED[0].channels), projection=32),),
     'sampling': SamplingConfig(search_factor=4.0, patch_size_min=80, patch_size_max=80),
     'learning': LearningConfig(iterations=1, gradient_steps=1, update_interval=2),
-    'scale': ScaleConfig(step=1.03, exponent_min=-5, exponent_max=5, learning_rate=0.3,
-                         slow_share=0.3, model_area=1024.0, label_sigma=1.5,
-                         damping=20.0, tolerance=0.5),
     'extent': ExtentConfig('extent'),
 }
 _PAPER: Mapping[str, Any] = {
     'features': _APPEARANCE + _MOTION,
     'sampling': SamplingConfig(patch_size_min=200, patch_size_max=300),
     'networks': NetworkConfig('vgg_m_2048', 'motion_cnn'),
-    'scale': ScaleConfig('search', step=1.03, exponent_min=-4, exponent_max=5),
+    'scale': ScaleConfig(exponent_min=-4, exponent_max=5),
     'presence': PresenceConfig(learn='always', distractors=False),
     'search': SearchConfig(candidates=0, tiles=0),
 }
-_UNSCALED = {**_PAPER, 'scale': ScaleConfig('none')}
+_UNSCALED = {**_PAPER, 'scale': ScaleConfig()}
 
 PRESETS: Mapping[str, Mapping[str, Any]] = MappingProxyType({
     'default': _DEFAULT,

@@ -79,10 +79,10 @@ class Detection:
         x, y = self.region.center
         return ((position[1] - y) / self.region.height, (position[0] - x) / self.region.width)
 
-    def recentered_sample(self, center=None) -> list[Array]:
-        """Return the sample with the target at the origin."""
-        d = self.peak.displacement if center is None else self.displacement_to(center)
-        return [shift(series, d) for series in self.sample]
+    def sample_around(self, center: tuple[float, float]) -> list[Array]:
+        """Return the sample with an image position (x, y) at the origin."""
+        displacement = self.displacement_to(center)
+        return [shift(series, displacement) for series in self.sample]
 
 
 class Detector:
@@ -184,9 +184,19 @@ class Detector:
             region = region_around(box, self._config.sampling)
             self._motion.remember(region, self._patch(view, region))
 
-    def remember(self, detection: Detection, center=None) -> None:
-        """Take the detection as a further training sample."""
-        self._operator.remember(detection.recentered_sample(center))
+    def remember(self, detection: Detection, center: tuple[float, float]) -> None:
+        """
+        Take the detection as a further training sample.
+
+        Parameters
+        ----------
+        detection : Detection
+            What was seen.
+        center : tuple of float
+            Image position (x, y) of the target, which may be known better than by the peak.
+
+        """
+        self._operator.remember(detection.sample_around(center))
 
     def train(self) -> None:
         """Adapt the filter to the samples."""

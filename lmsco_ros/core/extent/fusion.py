@@ -12,57 +12,127 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Fusion of what was measured of a target's extent with what was expected, by variances."""
+"""
+Fusion of what is measured of a target's extent with what was expected, by their variances.
+
+Along each axis, the state is the two edges of the target; a Kalman filter whose prediction is the
+last size around the place that the correlation filter has found, and whose measurement is that of
+the network.
+"""
 
 from __future__ import annotations
 
-import os
 import numpy as np
+import numpy.typing as npt
 
 from lmsco_ros.core.extent.measurement import Measurement
 from lmsco_ros.core.types import BoundingBox
 
-__all__ = ['ExtentFilter']
-K_C=float(os.environ.get('K_C','.08'))
-K_Q=float(os.environ.get('K_Q','.015'))
-K_QB=float(os.environ.get('K_QB','.15'))
-K_S=float(os.environ.get('K_S','1.5'))
-K_T=float(os.environ.get('K_T','.5'))
-K_H=float(os.environ.get('K_H','.08'))
+__all__ = ['EdgeFilter']
+
+_Array = npt.NDArray[np.float64]
+
+# In sides of the target: the error of a box that a person draws, that of the correlation filter's
+# center, and the change of a side from one frame to the next, of a target in view and of one that
+# a border of the image cuts.
+_DRAWN, _FOUND, _CHANGE, _CHANGE_AT_BORDER = 0.08, 0.08, 0.015, 0.15
+_DRAWN_PIXELS = 0.7
+_BORDER_PIXELS = 1.5
+# In deviations: what a measurement differs from the box of the start without telling of a change,
+# since a person has drawn that after a convention of his own.
+_CONVENTION = 0.5
+_SMALLEST_SIDE = 2.0
 
 
-class ExtentFilter:
-    def __init__(self, box: BoundingBox, image_size) -> None:
-        self._sides = np.array(box.size)
-        side = box.area**.5
-        self._variances = np.full(2, 2*(K_H * side)**2 + .5)
-        self._limits = np.array(image_size, float)
+class EdgeFilter:
+    """
+    The size of a target, and how sure it is.
 
-    def __call__(self, box, center: tuple[float, float], measured: Measurement | None) -> BoundingBox:
-        side = box.area**.5
-        center = np.array(center)
-        edges = center[:, None] + self._sides[:, None] * np.array([-.5, .5])
-        q = np.full(2, (K_Q * side)**2)
-        touch = (edges[:, 0] < 1) | (edges[:, 1] > self._limits - 1)
-        if measured is not None:
-            touch |= (measured.edges[:, 0] < 1.5) | (measured.edges[:, 1] > self._limits - 1.5)
-        q[touch] += (K_QB * side)**2
-        s = self._variances + q
-        c = np.where(touch, 2, 1) * (K_C * side)**2
-        if measured is None:
-            self._variances = s
-            return BoundingBox.from_center(tuple(center), tuple(self._sides))
-        out = []
-        for a in range(2):
-            P = np.array([[c[a] + s[a]/4, c[a] - s[a]/4], [c[a] - s[a]/4, c[a] + s[a]/4]])
-            dev = K_S * measured.deviations[a]
-            innov = measured.edges[a] - edges[a]
-            innov = np.sign(innov) * np.maximum(0, np.abs(innov) - K_T * dev)
-            S = P + np.diag(dev**2)
-            G = P @ np.linalg.inv(S)
-            e = edges[a] + G @ innov
-            P = P - G @ P
-            self._sides[a] = max(2.0, e[1] - e[0])
-            self._variances[a] = P[0,0]+P[1,1]-2*P[0,1]
-            out.append((e[0]+e[1])/2)
-        return BoundingBox.from_center(tuple(out), tuple(self._sides))
+    Parameters
+    ----------
+    box : BoundingBox
+        The target in the first frame.
+    image_size : tuple of int
+        Width and height of the image in pixels.
+
+    """
+
+    def __init__(self, box: BoundingBox, image_size: tuple[int, int]) -> None:
+        self._limits = np.array(image_size, np.float64)
+        # A box that the border cuts says nothing of what will be drawn around the whole.
+        cut = bool(self._at_border(_edges(box)).any())
+        self._convention = 0.0 if cut else _CONVENTION
+        error = (_DRAWN * _side(box))**2 + _DRAWN_PIXELS**2
+        self._covariances = np.tile(np.diag([error, error]), (2, 1, 1))
+
+    def __call__(self, box: BoundingBox, measured: Measurement) -> BoundingBox:
+        """
+        Return the box of the target.
+
+        Parameters
+        ----------
+        box : BoundingBox
+            In the size of the last frame, around the place that the filter has found.
+        measured : Measurement
+            Of the network.
+
+        """
+        edges, side = _edges(box), _side(box)
+        at_border = self._at_border(edges) | self._at_border(measured.edges)
+        found = np.where(at_border, 2, 1) * (_FOUND * side)**2
+        change = np.where(at_border, _CHANGE_AT_BORDER**2 + _CHANGE**2, _CHANGE**2) * side**2
+        size = size_variance(self._covariances) + change
+        predicted = _predicted(found, size)
+        differing = self._differing(measured.edges - edges, measured.deviations)
+        noise = measured.deviations**2
+        gain = predicted @ np.linalg.inv(predicted + noise[:, :, None] * np.eye(2))
+        fused = edges + (gain @ differing[:, :, None])[:, :, 0]
+        self._covariances = predicted - gain @ predicted
+        return _box(fused)
+
+    @property
+    def covariance(self) -> _Array:
+        """Covariance of center x, center y, width and height in px^2, shape (4, 4)."""
+        result = np.zeros((4, 4))
+        for axis, part in enumerate(self._covariances):
+            change = np.array([[0.5, 0.5], [-1.0, 1.0]])
+            result[axis::2, axis::2] = change @ part @ change.T
+        return result
+
+    def _at_border(self, edges: _Array) -> npt.NDArray[np.bool_]:
+        """Return along which axes edges (2, 2) lie at the border of the image, or beyond it."""
+        return ((edges[:, 0] < _BORDER_PIXELS)
+                | (edges[:, 1] > self._limits - _BORDER_PIXELS))
+
+    def _differing(self, difference: _Array, deviations: _Array) -> _Array:
+        """Return what is left of a difference beyond that of conventions."""
+        spared = self._convention * deviations
+        return np.sign(difference) * np.maximum(0.0, np.abs(difference) - spared)
+
+
+def size_variance(covariances: _Array) -> _Array:
+    """Return the variances of the distance of two edges, from covariances (2, 2, 2) of both."""
+    return covariances[:, 0, 0] + covariances[:, 1, 1] - 2 * covariances[:, 0, 1]
+
+
+def _predicted(center: _Array, size: _Array) -> _Array:
+    """Return covariances (2, 2, 2) of two edges, from variances of center and size along axes."""
+    same, opposite = np.ones((2, 2)), np.array([[1, -1], [-1, 1]])
+    return center[:, None, None] * same + size[:, None, None] / 4 * opposite
+
+
+def _edges(box: BoundingBox) -> _Array:
+    """Return left and right, upper and lower edge, shape (2, 2)."""
+    return np.array([[box.x, box.x + box.width], [box.y, box.y + box.height]])
+
+
+def _box(edges: _Array) -> BoundingBox:
+    """Return the box of edges, with sides that can be tracked."""
+    width, height = np.maximum(_SMALLEST_SIDE, edges[:, 1] - edges[:, 0]).tolist()
+    x, y = edges.mean(axis=1).tolist()
+    return BoundingBox.from_center((x, y), (width, height))
+
+
+def _side(box: BoundingBox) -> float:
+    """Return the side of a square as large as a box."""
+    return float(box.area**0.5)

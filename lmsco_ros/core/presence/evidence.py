@@ -39,8 +39,8 @@ class Evidence:
         What the filter of the first frame says of the peak, as a part of what it says of the
         target there.
     presence : float or None
-        Log-odds, by comparison with the first frame, that the target is there; None where
-        nothing is compared.
+        Log-odds, by the network that measures the extent, that the target of the first frame
+        is there; None where nothing measures.
     jump : float
         Distance, in sides of the target, from where it was expected.
 

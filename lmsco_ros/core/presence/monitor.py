@@ -79,11 +79,6 @@ class PresenceMonitor:
         score = trust(quality, evidence.likeness, presence) if quality else 0.0
         return Assessment(evidence, quality, presence, score)
 
-    def beyond_doubt(self, seen: Assessment) -> bool:
-        """Return whether the target was just seen, and a frame shows it where it is expected."""
-        return (self._state is TrackState.TRACKING and not self.after_cut
-                and seen.evidence.jump <= JUMP and seen.score >= self.config.uncertain)
-
     def believable(self, seen: Assessment) -> bool:
         """Return whether a frame shows the target."""
         return self.config.learn == 'always' or not self._misses_target(seen)
@@ -92,7 +87,7 @@ class PresenceMonitor:
         """
         Return whether a frame shows the target even where it was not expected.
 
-        Filter, first filter and comparison must agree, each of them; less so after a cut.
+        Filter, first filter and extent network must agree, each of them; less so after a cut.
         """
         found, part, present = _AFTER_CUT if self.after_cut else (1.0, 1.0, 0.0)
         return (seen.score >= min(self.config.found, found)

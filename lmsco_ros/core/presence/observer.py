@@ -78,7 +78,7 @@ class Sighting:
 
 class Observer:
     """
-    Looks with the filter, compares with the first frame, and knows the distractors.
+    Looks with the filter, measures with the network, and knows the distractors.
 
     Parameters
     ----------
@@ -101,8 +101,7 @@ class Observer:
         self._distractors = Distractors()
         self._first_likeness = detector.likeness(first)
 
-    def look(self, outlook: Outlook, factors: Sequence[float],
-             presence: float | None = None) -> Sighting:
+    def look(self, outlook: Outlook, factors: Sequence[float]) -> Sighting:
         """
         Return what is around the expected place, or just there where that is a distractor.
 
@@ -112,19 +111,12 @@ class Observer:
             The frame; called once for each.
         factors : sequence of float
             Scales at which the target is searched.
-        presence : float, optional
-            Comparison of the frame before, which stands for that of this frame as long as
-            nothing raises a doubt; by default the comparison is made.
 
         """
         self._distractors.next_frame()
         detection = self._detector(outlook.view, outlook.expected, factors)
         if self.is_distractor(outlook, detection):
             detection = self._detector.near(detection, outlook.expected.center)
-        if presence is not None:
-            as_before = self._sighting(outlook, detection, outlook.expected, presence, None)
-            if self._monitor.beyond_doubt(as_before.assessment):
-                return as_before
         return self.weigh(outlook, detection, outlook.expected)
 
     def detect(self, outlook: Outlook, box: BoundingBox) -> Detection:
@@ -132,11 +124,14 @@ class Observer:
         return self._detector(outlook.view, box)
 
     def weigh(self, outlook: Outlook, detection: Detection, box: BoundingBox) -> Sighting:
-        """Return a detection around a box, compared with the first frame."""
-        measurement = None if self._meter is None else self._meter(
+        """Return a detection around a box, measured, with all that speaks for it."""
+        measured = None if self._meter is None else self._meter(
             outlook.view, box.moved_to(detection.center))
-        presence = None if measurement is None else measurement.presence
-        return self._sighting(outlook, detection, box, presence, measurement)
+        likeness = self._detector.likeness(detection) / self._first_likeness
+        jump = math.dist(detection.center, outlook.expected.center) / outlook.expected.area**0.5
+        presence = None if measured is None else measured.presence
+        evidence = Evidence(detection.sharpness, likeness, presence, jump)
+        return Sighting(box, detection, self._monitor.assess(evidence), measured)
 
     def is_distractor(self, outlook: Outlook, detection: Detection) -> bool:
         """Return whether something else than the target was detected; if so, note its place."""
@@ -160,11 +155,3 @@ class Observer:
         outlook = Outlook(view, box, box)
         seen = self._detector.near(self.detect(outlook, box), box.center)
         return self._monitor.resembles(self.weigh(outlook, seen, box).assessment.evidence)
-
-    def _sighting(self, outlook: Outlook, detection: Detection, box: BoundingBox,
-                  presence: float | None, measurement: Measurement | None) -> Sighting:
-        """Return a detection around a box with all that speaks for it."""
-        likeness = self._detector.likeness(detection) / self._first_likeness
-        jump = math.dist(detection.center, outlook.expected.center) / outlook.expected.area**0.5
-        evidence = Evidence(detection.sharpness, likeness, presence, jump)
-        return Sighting(box, detection, self._monitor.assess(evidence), measurement)

@@ -16,7 +16,7 @@
 The probability that a detection is the target, from all that speaks for it.
 
 A logistic regression, fitted by `python -m training.trust --data DATA` on clips of the train part
-that the comparison network never saw, as they are and under challenges, on detections that
+that the extent network never saw, as they are and under challenges, on detections that
 overlap the target by more than a half or not at all. The former weigh nine times as much as the
 latter, as while a target is followed: a score of 0.5 is rather a sign of its absence.
 """
@@ -26,7 +26,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 import math
 
-__all__ = ['trust', 'TrustModel', 'COMPARED', 'UNCOMPARED']
+__all__ = ['trust', 'TrustModel', 'MEASURED', 'UNMEASURED']
 
 _QUALITY_LIMITS = 0.02, 5.0
 _LIKENESS_LIMITS = -0.5, 1.5
@@ -45,7 +45,7 @@ class TrustModel:
     likeness : float
         Of the score of the first frame's filter.
     presence : float
-        Of the log-odds of the comparison network.
+        Of the log-odds of the extent network.
     constant : float
         Added.
 
@@ -57,8 +57,8 @@ class TrustModel:
     constant: float
 
 
-COMPARED = TrustModel(quality=1.26, likeness=1.53, presence=0.42, constant=1.81)
-UNCOMPARED = TrustModel(quality=2.09, likeness=2.23, presence=0.0, constant=2.47)
+MEASURED = TrustModel(quality=1.26, likeness=1.53, presence=0.42, constant=1.81)
+UNMEASURED = TrustModel(quality=2.09, likeness=2.23, presence=0.0, constant=2.47)
 
 
 def regressors(quality: float, likeness: float, presence: float) -> tuple[float, float, float]:
@@ -78,10 +78,10 @@ def trust(quality: float, likeness: float, presence: float | None) -> float:
     likeness : float
         Score of the first frame's filter at the peak, as a part of that in the first frame.
     presence : float or None
-        Log-odds of the comparison network; None where there is none.
+        Log-odds of the extent network; None where there is none.
 
     """
-    model = UNCOMPARED if presence is None else COMPARED
+    model = UNMEASURED if presence is None else MEASURED
     values = regressors(quality, likeness, presence or 0.0)
     odds = model.constant + sum(
         weight * value for weight, value in zip(
