@@ -27,6 +27,10 @@ class BoxError(LMSCOError):
     """The box is degenerate, too small to learn from, or not in the image."""
 
 
+class PointError(LMSCOError):
+    """The point is not in the image, or nothing stands out from its surroundings there."""
+
+
 class ConfigError(LMSCOError):
     """A configuration key is unknown or its value is out of range."""
 

@@ -76,7 +76,7 @@ class Track:
         self._detector = Detector(config, backend, networks, view, box)
         first = self._detector(view, box)
         self._first_peak = first.peak.value
-        meter = ExtentMeter(networks.extent, view, box) if networks.extent else None
+        meter = ExtentMeter.marked(networks.extent, view, box) if networks.extent else None
         self._monitor = PresenceMonitor(config.presence)
         self._observer = Observer(self._detector, meter, self._monitor, first)
         self._prediction = Prediction()

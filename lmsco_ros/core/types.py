@@ -118,6 +118,11 @@ class BoundingBox:
         """Return the box enlarged by `factor` around its center."""
         return BoundingBox.from_center(self.center, (factor * self.width, factor * self.height))
 
+    def contains(self, point: tuple[float, float]) -> bool:
+        """Return whether an image position (x, y) lies in the box or on its edge."""
+        return (self.x <= point[0] <= self.x + self.width
+                and self.y <= point[1] <= self.y + self.height)
+
     def intersection(self, other: BoundingBox) -> float:
         """Return the common area with `other` in square pixels."""
         width = min(self.x + self.width, other.x + other.width) - max(self.x, other.x)

@@ -165,6 +165,7 @@ def main() -> None:
     schedule = Schedule(**settings['schedule'], device=options.device)
     if options.minutes:
         schedule = replace(schedule, minutes=options.minutes)
+    held = settings['validation']
     torch.manual_seed(config['seed'])
     device = schedule.torch_device
     windows = {name: read_windows(options.windows, name).to(device)
@@ -173,7 +174,7 @@ def main() -> None:
         'rendered': RenderedPairs(windows['textures']),
         'stills': StillPairs(windows['stills'], windows['textures']),
         'clips': ClipPairs(windows['clips'])}
-    held_out = {name: take(batches({name: source}, {name: 1.0}, 256), settings['validation'])
+    held_out = {name: take(batches({name: source}, {name: 1.0}, held['size']), held['batches'])
                 for name, source in {**sources, 'clips': ClipPairs(windows['held_out'])}.items()}
     trained = {name: source for name, source in sources.items() if name != options.without}
     network, name = ExtentNet(), f'extent_without_{options.without}' if options.without else 'extent'

@@ -32,10 +32,12 @@ __all__ = ['EdgeFilter']
 
 _Array = npt.NDArray[np.float64]
 
-# In sides of the target: the error of a box that a person draws, that of the correlation filter's
-# center, and the change of a side from one frame to the next, of a target in view and of one that
-# a border of the image cuts.
-_DRAWN, _FOUND, _CHANGE, _CHANGE_AT_BORDER = 0.08, 0.08, 0.015, 0.15
+# In sides of the target: the error of a box that a person draws, and that of the correlation
+# filter's center.
+_DRAWN, _FOUND = 0.08, 0.08
+# The change of a side from one frame to the next: of a target in view, of one of which the first
+# box held a part, and what comes to it while a border of the image cuts the target.
+_CHANGE, _CHANGE_OF_PART, _CHANGE_AT_BORDER = 0.02, 0.1, 0.15
 _DRAWN_PIXELS = 0.7
 _BORDER_PIXELS = 1.5
 # In deviations: what a measurement differs from the box of the start without telling of a change,
@@ -61,7 +63,7 @@ class EdgeFilter:
         self._limits = np.array(image_size, np.float64)
         # A box that the border cuts says nothing of what will be drawn around the whole.
         cut = bool(self._at_border(_edges(box)).any())
-        self._convention = 0.0 if cut else _CONVENTION
+        self._convention, self._change = (0.0, _CHANGE_OF_PART) if cut else (_CONVENTION, _CHANGE)
         error = (_DRAWN * _side(box))**2 + _DRAWN_PIXELS**2
         self._covariances = np.tile(np.diag([error, error]), (2, 1, 1))
 
@@ -80,7 +82,7 @@ class EdgeFilter:
         edges, side = _edges(box), _side(box)
         at_border = self._at_border(edges) | self._at_border(measured.edges)
         found = np.where(at_border, 2, 1) * (_FOUND * side)**2
-        change = np.where(at_border, _CHANGE_AT_BORDER**2 + _CHANGE**2, _CHANGE**2) * side**2
+        change = (np.where(at_border, _CHANGE_AT_BORDER**2, 0) + self._change**2) * side**2
         size = size_variance(self._covariances) + change
         predicted = _predicted(found, size)
         differing = self._differing(measured.edges - edges, measured.deviations)

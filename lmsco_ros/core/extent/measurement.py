@@ -32,6 +32,8 @@ if TYPE_CHECKING:
 
 __all__ = ['ExtentMeter', 'Measurement']
 
+_SMALLEST_SIDE = 1.0
+
 
 @dataclass(frozen=True)
 class Measurement:
@@ -62,23 +64,34 @@ class Measurement:
 
 class ExtentMeter:
     """
-    Measures targets like the one of the first frame, which never changes.
+    Measures targets like a known one, which never changes.
 
     Parameters
     ----------
     network : ExtentNet
         What measures.
-    view : FrameView
-        First frame.
-    box : BoundingBox
-        The target in it.
+    reference : tensor
+        What the network knows of the target.
+    side : float
+        Binary logarithm of its side in pixels.
 
     """
 
-    def __init__(self, network: ExtentNet, view: FrameView, box: BoundingBox) -> None:
+    def __init__(self, network: ExtentNet, reference: torch.Tensor, side: float) -> None:
         self._network = network
-        self._first_side = math.log2(_side(box))
-        self._reference = network.reference(network.encode(self._patch(view, box)))
+        self._reference = reference
+        self._first_side = side
+
+    @classmethod
+    def marked(cls, network: ExtentNet, view: FrameView, box: BoundingBox) -> ExtentMeter:
+        """Return what measures targets like the one in a box of the first frame."""
+        encoding = network.encode(_patch(network, view, box))
+        return cls(network, network.reference(encoding), math.log2(_side(box)))
+
+    @classmethod
+    def unmarked(cls, network: ExtentNet) -> ExtentMeter:
+        """Return what measures anything that stands out from its surroundings."""
+        return cls(network, network.reference(network.nothing), 0.0)
 
     def __call__(self, view: FrameView, box: BoundingBox) -> Measurement:
         """
@@ -93,22 +106,30 @@ class ExtentMeter:
 
         """
         answer = self._network.relate(self._reference, self._network.encode(
-            self._patch(view, box)), (self._first_side, math.log2(_side(box))))
+            _patch(self._network, view, box)), (self._first_side, math.log2(_side(box))))
         unit = self._network.context * _side(box) / 2
         expected = np.array([[box.x, box.x + box.width], [box.y, box.y + box.height]])
         # The network speaks of left, top, right, bottom, and of Laplace distributions.
-        edges = np.sort(expected + unit * answer[:4].reshape(2, 2).T, axis=1)
+        edges = _apart(expected + unit * answer[:4].reshape(2, 2).T)
         deviations = math.sqrt(2) * unit * np.exp(answer[4:8].reshape(2, 2).T)
         return Measurement(edges, deviations, float(answer[8]))
 
-    def _patch(self, view: FrameView, box: BoundingBox) -> np.ndarray:
-        """Return what the network sees of a box, shape (3, size, size)."""
-        size = self._network.size
-        side = self._network.context * _side(box)
-        region = BoundingBox.from_center(box.center, (side, side))
-        image = BoundingBox(0, 0, *view.size)
-        return np.stack([view.patch(region, (size, size)), _covered(region, box, size),
-                         _covered(region, image, size)])
+
+
+def _patch(network: ExtentNet, view: FrameView, box: BoundingBox) -> np.ndarray:
+    """Return what a network sees of a box, shape (3, size, size)."""
+    size, side = network.size, network.context * _side(box)
+    region = BoundingBox.from_center(box.center, (side, side))
+    image = BoundingBox(0, 0, *view.size)
+    return np.stack([view.patch(region, (size, size)), _covered(region, box, size),
+                     _covered(region, image, size)])
+
+
+def _apart(edges: np.ndarray) -> np.ndarray:
+    """Return edges in their order, and no nearer to each other than can be seen."""
+    middle = edges.mean(axis=1, keepdims=True)
+    half = np.maximum(np.abs(np.diff(edges, axis=1)), _SMALLEST_SIDE) / 2
+    return np.concatenate([middle - half, middle + half], axis=1)
 
 
 def _side(box: BoundingBox) -> float:

@@ -75,6 +75,11 @@ class ExtentNet(Backbone):
         """Return the encoding of one patch, shape (3, size, size), float32."""
         return self(torch.from_numpy(patch)[None].to(self.answer.weight.device))[0]
 
+    @property
+    def nothing(self) -> torch.Tensor:
+        """Encoding in place of that of a target that was never marked, shape (1, 64, 8, 8)."""
+        return self.answer.weight.new_zeros(1, 64, 8, 8)
+
     @torch.inference_mode()
     def relate(self, reference: torch.Tensor, now: torch.Tensor,
                sides: tuple[float, float]) -> np.ndarray:

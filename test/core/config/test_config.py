@@ -22,7 +22,7 @@ import yaml
 
 from lmsco_ros.core import ConfigError, TrackerConfig
 from lmsco_ros.core.config import (
-    ChannelConfig, ComparisonConfig, FeatureConfig, IntensityConfig, LearningConfig, MotionConfig,
+    ChannelConfig, ExtentConfig, FeatureConfig, IntensityConfig, LearningConfig, MotionConfig,
     NetworkConfig, PresenceConfig, RuntimeConfig, SamplingConfig, ScaleConfig, SearchConfig)
 
 weights = st.floats(0.01, 100)
@@ -43,12 +43,11 @@ configs = st.builds(
                        patch_size_max=st.integers(200, 1024), newton_steps=st.integers(0, 100)),
     networks=st.builds(NetworkConfig, words, words, words | st.just('')),
     motion=st.builds(MotionConfig, st.booleans(), st.floats(0, 100)),
-    comparison=st.builds(ComparisonConfig, words | st.just('')),
+    extent=st.builds(ExtentConfig, words | st.just('')),
     learning=st.builds(LearningConfig, loss=st.sampled_from(['unit', 'coupled', 'ridge']),
                        window_minimum=st.floats(1e-6, 1), window_edge=st.floats(1, 1e3),
                        memory_size=st.integers(1, 1000)),
-    scale=st.builds(ScaleConfig, estimator=st.sampled_from(['filter', 'search', 'none']),
-                    step=st.floats(1.001, 1.15), exponent_min=st.integers(-9, 0),
+    scale=st.builds(ScaleConfig, step=st.floats(1.001, 1.15), exponent_min=st.integers(-9, 0),
                     exponent_max=st.integers(0, 9)),
     presence=st.builds(PresenceConfig, lost=st.floats(0, 0.1),
                        uncertain=st.floats(0.1, 0.5), certain=st.floats(0.5, 1),
@@ -109,8 +108,9 @@ def test_presets_of_the_ablation_are_one_factor_apart():
     assert motion_too[:-1] == appearance
     assert {group.kind for block in appearance for group in block.channels} == {'appearance'}
     assert [group.kind for group in motion_too[-1].channels] == ['motion']
-    assert TrackerConfig.preset('ma').scale.estimator == 'none'
-    assert TrackerConfig.preset('paper').scale.estimator == 'search'
+    assert TrackerConfig.preset('ma').scale == ScaleConfig(exponent_min=0, exponent_max=0)
+    scale = TrackerConfig.preset('paper').scale
+    assert (scale.exponent_min, scale.exponent_max) == (-4, 5)
 
 
 def test_partial_configuration_changes_only_what_it_names():
@@ -134,9 +134,9 @@ def test_empty_configuration_is_the_default(tmp_path):
 
 
 def test_whole_numbers_may_be_written_either_way():
-    config = TrackerConfig.from_dict({'learning': {'memory_size': 5.0}, 'scale': {'padding': 2}})
+    config = TrackerConfig.from_dict({'learning': {'memory_size': 5.0}, 'scale': {'step': 2}})
     assert config.learning.memory_size == 5 and isinstance(config.learning.memory_size, int)
-    assert config.scale.padding == 2.0 and isinstance(config.scale.padding, float)
+    assert config.scale.step == 2.0 and isinstance(config.scale.step, float)
 
 
 def test_given_mapping_is_left_alone():
@@ -212,10 +212,7 @@ BOUNDS = [
     (LearningConfig, 'initial_iterations', 0, 1001), (LearningConfig, 'iterations', 0, 1001),
     (LearningConfig, 'gradient_steps', 0, 1001), (LearningConfig, 'update_interval', 0, 1001),
     (ScaleConfig, 'step', 1, 2.1), (ScaleConfig, 'exponent_min', -51, 1),
-    (ScaleConfig, 'exponent_max', -1, 51), (ScaleConfig, 'learning_rate', -0.1, 1.1),
-    (ScaleConfig, 'model_area', 63, 65537), (ScaleConfig, 'padding', 0.9, 4.1),
-    (ScaleConfig, 'regularization', 0, 101), (ScaleConfig, 'label_sigma', 0, 51),
-    (ScaleConfig, 'tolerance', -1, 11),
+    (ScaleConfig, 'exponent_max', -1, 51),
     (MotionConfig, 'least_motion', -0.1, 101),
     (PresenceConfig, 'found', 0.05, 1.1), (PresenceConfig, 'certain', 0.4, 1.1),
     (PresenceConfig, 'sharp', -0.1, 2.1), (PresenceConfig, 'alike', -1.1, 2.1),
@@ -263,7 +260,7 @@ def test_values_that_do_not_go_together_are_refused(values, words):
 
 @pytest.mark.parametrize('section, name, choices', [
     ('learning', 'loss', 'unit, coupled, ridge'),
-    ('scale', 'estimator', 'filter, search, none'),
+    ('presence', 'learn', 'tracking, always'),
 ])
 def test_choices_are_listed(section, name, choices):
     with pytest.raises(ConfigError, match=f"{name} is 'other'; expected one of {choices}"):

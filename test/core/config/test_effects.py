@@ -41,9 +41,7 @@ BASE = {
     'features': [{'channels': [HOG, {'kind': 'intensity'}]}],
     'sampling': {'search_factor': 4.0, 'patch_size_min': 84, 'patch_size_max': 84},
     'learning': {'initial_iterations': 6, 'memory_size': 4},
-    'scale': {'exponent_min': -3, 'exponent_max': 3, 'damping': 0.0, 'tolerance': 0.0,
-              'model_area': 512.0},
-    'comparison': {'network': ''}, 'search': {'candidates': 1, 'tiles': 1}}
+    'extent': {'network': ''}, 'search': {'candidates': 1, 'tiles': 1}}
 
 
 class Effect(NamedTuple):
@@ -180,7 +178,7 @@ def threads(config, scene):
         limit_threads(1)
 
 
-SEARCH = {'scale': {'estimator': 'search'}}
+SEARCH = {'scale': {'exponent_min': -1, 'exponent_max': 1}}
 # Cells in which every network can be read.
 LEARNED, MOTION = ({
     'features': [{'channels': [HOG]}, {'channels': [{'kind': kind, 'layer': 'deep'}], 'cell': 16}],
@@ -218,20 +216,10 @@ EFFECTS = (
     Effect('learning.iterations', 5, walk),
     Effect('learning.gradient_steps', 4, walk),
     Effect('learning.update_interval', 3, walk),
-    Effect('scale.estimator', 'none', walk),
-    Effect('scale.step', 1.05, walk),
+    Effect('scale.step', 1.05, walk, SEARCH),
     Effect('scale.exponent_min', 0, walk, SEARCH),
-    Effect('scale.exponent_max', 0, walk),
-    Effect('scale.learning_rate', 0.9, walk),
-    Effect('scale.slow_rate', 0.9, walk, {'scale': {'slow_share': 0.5}}),
-    Effect('scale.slow_share', 0.9, walk, {'scale': {'slow_rate': 0.0}}),
-    Effect('scale.model_area', 128.0, walk),
-    Effect('scale.padding', 2.0, walk),
-    Effect('scale.regularization', 1.0, walk),
-    Effect('scale.label_sigma', 3.0, walk),
-    Effect('scale.damping', 40.0, walk),
-    Effect('scale.tolerance', 1.0, walk),
-    Effect('comparison.network', 'comparison', walk),
+    Effect('scale.exponent_max', 0, walk, SEARCH),
+    Effect('extent.network', 'extent', walk),
     Effect('presence.learn', 'always', verdicts),
     Effect('presence.reference_frames', 3, verdicts),
     Effect('presence.uncertain', 0.5, verdicts),

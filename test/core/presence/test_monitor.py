@@ -235,7 +235,7 @@ def test_score_that_is_just_enough_is_enough():
     assert believable(with_thresholds(lost=score, uncertain=1.0, certain=1.0, found=1.0), HALF)
     assert convincing(with_thresholds(found=score, alike=0.5), HALF)
     monitor = with_thresholds(uncertain=score, certain=1.0)
-    assert monitor.beyond_doubt(monitor.assess(HALF)) and monitor.resembles(HALF)
+    assert monitor.resembles(HALF)
     assert believable(monitor, replace(HALF, jump=2.0))
     above = float(np.nextafter(score, 1))
     monitor = with_thresholds(uncertain=above, certain=1.0)
@@ -285,21 +285,6 @@ def test_uncertain_frames_do_not_become_usual(monitor):
     for _ in range(9):
         assert judge(monitor, doubtful).state is TrackState.UNCERTAIN
     assert monitor.assess(HALF).presence == before
-
-
-def test_doubt_is_raised_by_state_cut_jump_and_score(monitor):
-    def beyond_doubt(evidence):
-        return monitor.beyond_doubt(monitor.assess(evidence))
-
-    assert beyond_doubt(CLEAR) and beyond_doubt(replace(CLEAR, jump=1.0))
-    assert not beyond_doubt(replace(CLEAR, jump=1.01))
-    assert beyond_doubt(at_score(monitor, 0.51)) and not beyond_doubt(at_score(monitor, 0.49))
-    monitor.note_cut()
-    assert not beyond_doubt(CLEAR)
-    judge(monitor, CLEAR)
-    assert beyond_doubt(CLEAR)
-    judge(monitor, at_score(monitor, 0.35))
-    assert not beyond_doubt(CLEAR)
 
 
 def test_target_that_goes_its_own_length_does_not_jump(monitor):

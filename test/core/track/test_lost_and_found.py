@@ -22,7 +22,7 @@ from lmsco_ros.core import BoundingBox, LMSCOTracker, TrackerConfig, TrackState
 CONFIG = TrackerConfig.from_dict({
     'features': [{'channels': [{'kind': 'hog'}, {'kind': 'intensity'}], 'cell': 4}],
     'sampling': {'patch_size_min': 100, 'patch_size_max': 100},
-    'comparison': {'network': ''}})
+    'extent': {'network': ''}})
 SIZE = (24.0, 18.0)
 START = (60.3, 64.4)
 

@@ -1,0 +1,143 @@
+# Copyright 2026 lmsco_ros contributors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""What is fused of two extents, against the dense Kalman update and known cases."""
+
+from hypothesis import given, strategies as st
+import numpy as np
+import pytest
+
+from lmsco_ros.core.extent.fusion import EdgeFilter
+from lmsco_ros.core.extent.measurement import Measurement
+from lmsco_ros.core.types import BoundingBox
+
+IMAGE = (320, 240)
+BOX = BoundingBox(100.0, 80.0, 40.0, 30.0)
+lengths = st.floats(4, 100)
+errors = st.floats(0.1, 30)
+
+
+def measured(box, deviation):
+    """Return a measurement of a box, all of whose edges are as sure."""
+    edges = np.array([[box.x, box.x + box.width], [box.y, box.y + box.height]])
+    return Measurement(edges, np.broadcast_to(np.asarray(deviation, float), (2, 2)), 5.0)
+
+
+def run(first, seen, deviation, frames=40):
+    """Return the box after some frames in which the same is measured."""
+    fuse, box = EdgeFilter(first, IMAGE), first
+    for _ in range(frames):
+        box = fuse(box, measured(seen, deviation))
+    return box, fuse
+
+
+def test_fusion_is_the_dense_kalman_update():
+    """Of the state (x0, x1, y0, y1), all at once, with the covariances written out."""
+    fuse = EdgeFilter(BOX, IMAGE)
+    deviations = np.array([[1.0, 2.0], [0.5, 3.0]])
+    seen = BoundingBox(90, 85, 60, 20)
+    side = BOX.area**0.5
+    drawn = (0.08 * side)**2 + 0.7**2
+    blocks = []
+    for _ in range(2):
+        size = 2 * drawn + (0.02 * side)**2
+        center = (0.08 * side)**2
+        map_to_edges = np.array([[1, -0.5], [1, 0.5]])
+        blocks.append(map_to_edges @ np.diag([center, size]) @ map_to_edges.T)
+    prior = np.block([[blocks[0], np.zeros((2, 2))], [np.zeros((2, 2)), blocks[1]]])
+    noise = np.diag(deviations.ravel()**2)
+    expected = np.array([100.0, 140, 80, 110])
+    difference = np.array([90.0, 150, 85, 105]) - expected
+    convention = 0.5 * deviations.ravel()
+    difference = np.sign(difference) * np.maximum(0, abs(difference) - convention)
+    gain = prior @ np.linalg.inv(prior + noise)
+    right = expected + gain @ difference
+    box = fuse(BOX, Measurement(np.array([[90.0, 150], [85, 105]]), deviations, 1.0))
+    assert box.as_tuple() == pytest.approx(
+        (right[0], right[2], right[1] - right[0], right[3] - right[2]))
+    assert seen.width > box.width > BOX.width
+    posterior = prior - gain @ prior
+    change = np.zeros((4, 4))
+    change[[0, 0, 1, 1], [0, 1, 2, 3]] = 0.5
+    change[[2, 2, 3, 3], [0, 1, 2, 3]] = -1, 1, -1, 1
+    assert fuse.covariance == pytest.approx(change @ posterior @ change.T)
+
+
+def test_sure_measurements_are_followed_at_once():
+    larger = BoundingBox(80.0, 70.0, 90.0, 60.0)
+    box, _ = run(BOX, larger, 0.3, frames=2)
+    assert box.overlap(larger) > 0.97
+
+
+def test_unsure_measurements_leave_the_size():
+    box, _ = run(BoundingBox(100, 80, 12, 12), BoundingBox(98, 78, 16, 16), 5.0, frames=100)
+    assert box.size == pytest.approx((12, 12))
+
+
+def test_what_a_convention_explains_is_no_change():
+    """A box that was drawn with a margin keeps it."""
+    tight = BoundingBox(100.4, 80.4, 39.2, 29.2)
+    box, _ = run(BOX, tight, 1.0, frames=100)
+    assert box.as_tuple() == pytest.approx(BOX.as_tuple())
+
+
+def test_box_that_the_border_cuts_has_no_convention():
+    entering = BoundingBox(0, 80, 8, 20)
+    whole = BoundingBox(0.0, 76.0, 30.0, 28.0)
+    box, _ = run(entering, whole, 1.0)
+    assert box.as_tuple() == pytest.approx(whole.as_tuple(), abs=0.05)
+
+
+def test_size_at_the_border_changes_faster():
+    near, far = BoundingBox(0, 80, 40, 30), BoundingBox(60, 80, 40, 30)
+    changes = []
+    for start in (near, far):
+        _, fuse = run(start, start, 2.0)
+        larger = BoundingBox(start.x, start.y, 50, 30)
+        changes.append(fuse(start, measured(larger, 2.0)).width - 40)
+    assert changes[0] > 1.5 * changes[1] > 0
+
+
+def test_variances_decide_where_filter_and_network_differ_on_the_center():
+    moved = BOX.moved_to((124.0, 95.0))
+    sure, unsure = (EdgeFilter(BOX, IMAGE)(BOX, measured(moved, deviation))
+                    for deviation in (0.2, 20.0))
+    assert sure.center[0] == pytest.approx(124, abs=0.2)
+    assert unsure.center[0] == pytest.approx(120, abs=0.2)
+
+
+@given(st.floats(-50, 300), st.floats(-50, 200), lengths, lengths, lengths, lengths, errors)
+def test_fused_boxes_have_sides_and_covariances_are_positive(x, y, width, height, wide, high,
+                                                             deviation):
+    fuse = EdgeFilter(BoundingBox(x, y, width, height), IMAGE)
+    box = BoundingBox(x, y, width, height)
+    for _ in range(3):
+        box = fuse(box, measured(BoundingBox(x + 3, y - 2, wide, high), deviation))
+        assert min(box.size) >= 2
+        assert np.linalg.eigvalsh(fuse.covariance).min() > 0
+        assert fuse.covariance == pytest.approx(fuse.covariance.T)
+
+
+@given(st.floats(0.2, 5))
+def test_unit_of_length_does_not_matter_but_for_pixels_of_drawing(scale):
+    """Twice as large in an image twice as large is twice the result, as far as pixels go."""
+    def fused(factor):
+        fuse = EdgeFilter(BOX.scaled(1.0), IMAGE)
+        fuse._covariances = fuse._covariances * factor**2
+        place = BoundingBox(*(factor * value for value in BOX.as_tuple()))
+        larger = BoundingBox(*(factor * value for value in (90.0, 70.0, 60.0, 50.0)))
+        fuse._limits = fuse._limits * factor + 50
+        return np.array(fuse(place, measured(larger, 2 * factor)).as_tuple())
+
+    assert fused(scale) == pytest.approx(scale * fused(1.0), rel=1e-6)

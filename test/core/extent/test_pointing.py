@@ -1,0 +1,74 @@
+# Copyright 2026 lmsco_ros contributors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""What is found at a point: the thing that stands out there, or why nothing was found."""
+
+import numpy as np
+import pytest
+
+from lmsco_ros.core.config import IntensityConfig
+from lmsco_ros.core.errors import PointError
+from lmsco_ros.core.extent.pointing import extent_at
+from lmsco_ros.core.imaging.gain import AutomaticGain
+from lmsco_ros.core.imaging.view import FrameView
+from lmsco_ros.core.types import BoundingBox
+from lmsco_ros.core.weights.store import load_backbone
+
+
+@pytest.fixture(scope='module')
+def network():
+    """Return the bundled network."""
+    return load_backbone('extent', None)
+
+
+def view(boxes, warmer=60.0, noise=2.0):
+    """Return a frame with an ellipse in each box."""
+    x, y = np.meshgrid(np.arange(200) + 0.5, np.arange(160) + 0.5)
+    image = 110 + noise * np.random.default_rng(5).normal(size=x.shape)
+    for box in boxes:
+        away = np.hypot((x - box.center[0]) / box.width, (y - box.center[1]) / box.height)
+        image += warmer / (1 + np.exp(30 * (away - 0.5)))
+    image = np.clip(image, 0, 255).astype(np.uint8)
+    return FrameView(image, AutomaticGain(IntensityConfig()).observe(image))
+
+
+@pytest.mark.parametrize('warmer', [60.0, -60.0])
+@pytest.mark.parametrize('size', [(12.0, 12.0), (30.0, 20.0), (24.0, 60.0), (90.0, 70.0)])
+def test_extent_of_what_stands_out_is_found(network, size, warmer):
+    box = BoundingBox.from_center((96, 78), size)
+    found = extent_at(network, view([box], warmer), (98, 80))
+    assert found.overlap(box) > 0.6
+
+
+def test_of_two_things_the_one_at_the_point_is_found(network):
+    boxes = [BoundingBox(50, 60, 20, 20), BoundingBox(110, 60, 20, 30)]
+    for box in boxes:
+        assert extent_at(network, view(boxes), box.center).overlap(box) > 0.6
+
+
+def test_box_stays_in_the_image(network):
+    found = extent_at(network, view([BoundingBox(-15, 60, 40, 30)]), (8, 75))
+    assert found.x >= 0 and found.overlap(BoundingBox(0, 60, 25, 30)) > 0.6
+
+
+@pytest.mark.parametrize('point', [(40, 40), (150, 120)])
+def test_noise_is_nothing(network, point):
+    with pytest.raises(PointError, match=r'nothing stands out .* warmer or colder'):
+        extent_at(network, view([], noise=8.0), point)
+
+
+@pytest.mark.parametrize('point', [(-1, 5), (201, 5), (5, 161)])
+def test_point_outside_is_refused(network, point):
+    with pytest.raises(PointError, match='not in the image of 200 x 160 pixels'):
+        extent_at(network, view([]), point)
