@@ -14,6 +14,7 @@
 
 """Where the filter sees a target whose place is known, and what it makes of other peaks."""
 
+from dataclasses import replace
 from unittest.mock import create_autospec, Mock
 
 import numpy as np
@@ -150,6 +151,17 @@ def test_likeness_is_that_of_the_peak(detector, scene, evaluate):
     detection = detector(view(scene.frame((84.0, 62.0))), BOX)
     ty, tx = detection.peak.displacement
     assert detector.likeness(detection) == pytest.approx(evaluate(detection.scores, ty, tx))
+
+
+def test_likeness_is_that_of_the_place_even_beside_a_maximum(detector, scene, evaluate):
+    """The filter that learns says where the target is; the first one has no say in that."""
+    detection = detector(view(scene.frame(CENTER)), BOX)
+    ty, tx = detection.peak.displacement
+    ty, tx = ty + 0.02, tx - 0.03
+    beside = replace(detection, peak=replace(detection.peak, displacement=(ty, tx)))
+    likeness = detector.likeness(beside)
+    assert likeness == pytest.approx(evaluate(detection.scores, ty, tx))
+    assert likeness < 0.95 * detector.likeness(detection)
 
 
 def test_filter_learns_what_it_is_given_only_when_it_trains(detector, make_scene):

@@ -127,7 +127,7 @@ def maxima(ratio, window):
 
 
 @pytest.mark.parametrize('contrast', [0.3, -0.3], ids=['warm', 'cold'])
-@pytest.mark.parametrize('size', [(6, 4), (2, 9), (5, 5)])
+@pytest.mark.parametrize('size', [(6, 4), (2, 9), (1, 9), (5, 5)])
 def test_all_candidates_are_the_maxima_of_signal_to_clutter(rng, size, contrast):
     pixels = 0.4 + 0.03 * rng.standard_normal((44, 56)).astype(np.float32)
     pixels[:, 30:] += 0.1 * rng.standard_normal((44, 26)).astype(np.float32)
@@ -173,6 +173,15 @@ def test_picture_is_reduced_to_the_target_and_to_the_pixels(sizes, image, target
     sizes.clear()
     salience.candidates(view, box, 1)
     assert sizes == [((0, 0, *image), size)]
+
+
+def test_place_is_right_where_rows_and_columns_are_reduced_differently():
+    """Five rows become two: one of them stands for 2.5 pixels, and a column for 2."""
+    image = np.full((5, 4000), 0.4, np.float32)
+    image[:, 2950:3050] = 0.8
+    view, box = FrameView(image, IntensityRange(0.0, 1.0)), BoundingBox(2950, 0, 100, 4)
+    first, = Salience(view, box).candidates(view, box, 1)
+    assert first.center == pytest.approx((3000, 2.5), abs=2)
 
 
 def test_thin_target_is_a_pixel_wide_in_the_reduced_picture():
