@@ -15,10 +15,10 @@
 """
 Fit the coefficients of `lmsco_ros.core.presence.trust`.
 
-    python -m training.trust --data DATA [--frames N]
+    python -m training.trust --data DATA --rendered FOLDER [--frames N]
 
-DATA holds `thermal_dev`. Every 5th clip of the train part, which the extent network never
-saw, is tracked as it is and under the challenges that take the target away, move it, or set
+DATA holds `thermal_dev`, FOLDER what `python -m training.extent.sequences` has written. Every 5th
+clip of the train part, and all rendered sequences, which the extent network never saw, are tracked as it is and under the challenges that take the target away, move it, or set
 another one beside it. Printed are the coefficients, and for each challenge the chance that a
 detection on the target is trusted more than one off it.
 """
@@ -96,14 +96,16 @@ def main(arguments: Sequence[str] | None = None) -> None:
     """Track, fit and print; leave with 2 where there is nothing to track."""
     parser = argparse.ArgumentParser(description=__doc__.split('\n\n')[0])
     parser.add_argument('--data', type=data_folder('thermal_dev'), required=True)
+    parser.add_argument('--rendered', type=Path, required=True)
     parser.add_argument('--frames', type=int, default=150, help='of each clip, at least 2')
     options = parser.parse_args(arguments)
     if options.frames < 2:
         parser.error(f'argument --frames: {options.frames} frames; at least 2 are needed')
     try:
-        sequences = validation_clips(options.data / 'thermal_dev', options.frames)
+        sequences = [*validation_clips(options.data / 'thermal_dev', options.frames),
+                     *scan_dataset(options.rendered).sequences]
     except EvaluationError as error:
-        parser.error(f'argument --data: {error}')
+        parser.error(str(error))
     limit_threads(1)
     records = {name: list(record_all(sequences, name)) for name in CHALLENGES}
     everything = [part for name, parts in records.items() if name not in COPIES

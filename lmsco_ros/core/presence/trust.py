@@ -57,8 +57,8 @@ class TrustModel:
     constant: float
 
 
-MEASURED = TrustModel(quality=1.46, likeness=1.47, presence=0.67, constant=-0.36)
-UNMEASURED = TrustModel(quality=2.40, likeness=2.00, presence=0.0, constant=3.09)
+MEASURED = TrustModel(quality=1.26, likeness=1.53, presence=0.42, constant=1.81)
+UNMEASURED = TrustModel(quality=2.09, likeness=2.23, presence=0.0, constant=2.47)
 
 
 def regressors(quality: float, likeness: float, presence: float) -> tuple[float, float, float]:
