@@ -18,9 +18,10 @@ Fit the coefficients of `lmsco_ros.core.presence.trust`.
     python -m training.trust --data DATA --rendered FOLDER [--frames N]
 
 DATA holds `thermal_dev`, FOLDER what `python -m training.extent.sequences` has written. Every 5th
-clip of the train part, and all rendered sequences, which the extent network never saw, are tracked as it is and under the challenges that take the target away, move it, or set
-another one beside it. Printed are the coefficients, and for each challenge the chance that a
-detection on the target is trusted more than one off it.
+clip of the train part, and all rendered sequences, which the extent network never saw, are
+tracked as they are and under the challenges that take the target away, move it, or set another
+one beside it. Printed are the coefficients, and for each challenge the chance that a detection on
+the target is trusted more than one off it.
 """
 
 from __future__ import annotations
