@@ -199,11 +199,161 @@ def test_leaving_shows_the_target_where_the_truth_says_and_nowhere_else():
             assert (inside(image, box) == TARGET).all()
 
 
-def test_a_target_that_fills_the_image_cannot_leave_it():
+def test_a_target_that_leaves_over_the_edge_stays_close_behind_it():
+    plain, made = sequence(), apply_challenge(sequence(), 'leave_edge')
+    absent = np.flatnonzero(is_absent(made.ground_truth))
+    assert 45 <= len(absent) < 80 and np.all(np.diff(absent) == 1)
+    size = made.frames[75].shape[::-1]
+    gaps = []
+    for index in range(0, FRAMES, 3):
+        image, box = made.frames[index], made.ground_truth[index]
+        if index in absent:
+            # What is around the target in the whole image is in view, but for the target.
+            assert (image == TARGET).sum() < 0.25 * 80
+            corner = corner_of(image, plain.frames[index])
+            x, y, width, height = plain.ground_truth[index]
+            gaps.append(max(corner[0] - x - width, x - corner[0] - size[0],
+                            corner[1] - y - height, y - corner[1] - size[1]))
+        elif (box[:2] >= 0).all() and (box[:2] + box[2:] <= size).all():
+            assert (inside(image, box) == TARGET).all()
+    assert 3 < max(gaps) < 8
+
+
+def corner_of(part, image):
+    """Return the corner (x, y) of the place where a part is in an image."""
+    found = cv2.matchTemplate(image, part, cv2.TM_SQDIFF)
+    return np.unravel_index(found.argmin(), found.shape)[::-1]
+
+
+@pytest.mark.parametrize('which', ['leave', 'leave_edge'])
+def test_a_target_that_fills_the_image_cannot_leave_it(which):
     made = sequence()
     made.ground_truth[:] = 30, 20, 90, 80
     with pytest.raises(SequenceError, match='too large'):
-        apply_challenge(made, 'leave')
+        apply_challenge(made, which)
+
+
+def test_other_view_is_the_mirrored_one_in_which_the_target_comes_up_late():
+    plain, made = sequence(), apply_challenge(sequence(), 'cut_other_view')
+    absent = np.flatnonzero(is_absent(made.ground_truth))
+    assert absent.tolist() == list(range(50, 110))
+    for index in (0, 49):
+        assert np.array_equal(made.frames[index], plain.frames[index])
+    for index in (50, 80, 109):
+        mirrored = plain.frames[index][:, ::-1]
+        assert made.frames[index].max() < 100
+        assert (made.frames[index] == mirrored).mean() > 0.9
+    for index in (110, 149):
+        assert np.array_equal(made.frames[index], plain.frames[index][:, ::-1])
+        assert (inside(made.frames[index], made.ground_truth[index]) == TARGET).all()
+
+
+def test_crossing_twin_comes_from_afar_over_the_target_and_goes_on():
+    made = apply_challenge(sequence(), 'twin_crosses')
+    assert np.array_equal(made.ground_truth, sequence().ground_truth)
+    ways = []
+    for index in range(45, 105, 3):
+        image, truth = made.frames[index], made.ground_truth[index]
+        assert (inside(image, truth) > 180).mean() > 0.6
+        _, _, _, middles = cv2.connectedComponentsWithStats((image > 180).astype(np.uint8))
+        others = middles[1:] - truth[:2] - truth[2:] / 2
+        ways.append(max(others, key=np.linalg.norm))
+    ways = np.array(ways)
+    # Before and after, it is on opposite sides, and it goes straight.
+    assert np.linalg.norm(ways[0]) > 20 and np.linalg.norm(ways[-1]) > 20
+    assert ways[0] @ ways[-1] < -0.98 * np.linalg.norm(ways[0]) * np.linalg.norm(ways[-1])
+    assert np.linalg.norm(ways, axis=1).min() < 4
+
+
+def line(plain, made, index):
+    """Return gain, offset and deviation of the noise between two images of a sequence."""
+    before, after = (item.frames[index].ravel().astype(float) for item in (plain, made))
+    gain, offset = np.polyfit(before, after, 1)
+    return gain, offset, (after - gain * before - offset).std()
+
+
+@pytest.mark.parametrize('which, gain, noisy, frames', [
+    ('noise_step', 1.0, 6, range(50, 150)), ('contrast_step', 0.3, 1, range(50, 100)),
+    ('stretch_step', 0.3, 6, range(50, 150))])
+def test_contrast_and_noise_are_stepped_from_one_frame_to_the_next(which, gain, noisy, frames):
+    plain, made = sequence(dtype=np.uint16), apply_challenge(sequence(dtype=np.uint16), which)
+    for index in (0, 49, 50, 99, 100, 149):
+        if index not in frames:
+            assert np.array_equal(made.frames[index], plain.frames[index])
+            continue
+        found, offset, noise = line(plain, made, index)
+        # The scene has noise of deviation 1.4, which shrinks with the contrast.
+        assert found == pytest.approx(gain, abs=0.05)
+        assert found * 70 + offset == pytest.approx(70, abs=2)
+        assert np.hypot(noise, gain * 1.4) == pytest.approx(noisy * 1.5, rel=0.25)
+        assert not np.array_equal(made.frames[index], made.frames[index - 1])
+
+
+def test_noise_of_colored_images_is_gray():
+    image = apply_challenge(sequence(channels=3), 'noise_step').frames[60]
+    assert (image == image[..., :1]).all()
+
+
+def test_images_without_noise_get_some():
+    plain = sequence(dtype=np.float32)
+    plain.frames.boxes[:] = np.nan_to_num(plain.frames.boxes)
+    steps = [apply_challenge(item, 'noise_step').frames[60] - item.frames[60]
+             for item in (plain, sequence())]
+    assert all(0.02 < step.astype(float).std() for step in steps)
+
+
+@pytest.mark.parametrize('which', ['start_on_background', 'start_on_noise'])
+def test_a_start_on_nothing_has_a_box_in_the_first_frame_only(which):
+    made = apply_challenge(sequence(), which)
+    assert is_absent(made.ground_truth).tolist() == [False] + [True] * (FRAMES - 1)
+    assert made.ground_truth[0, 2:].tolist() == [10, 8]
+    with pytest.raises(SequenceError, match='needs at least 40'):
+        apply_challenge(sequence(39), which)
+
+
+def test_background_is_that_of_the_scene_away_from_the_target():
+    for name in 'abcdef':
+        plain = sequence(name=name)
+        made = apply_challenge(plain, 'start_on_background')
+        box, target = made.ground_truth[0], plain.ground_truth[0]
+        assert (np.abs(box[:2] - target[:2]) >= [15, 12]).any()
+        assert (box[:2] >= [5, 4]).all() and (box[:2] + box[2:] <= np.subtract(SIZE, [5, 4])).all()
+        assert np.array_equal(made.frames[7], plain.frames[7])
+
+
+def test_background_does_not_stand_out():
+    plain = sequence()
+    values = plain.frames[0].astype(float)
+    rng = np.random.default_rng(3)
+    # Most of the picture is full of edges; a quarter of it is even.
+    values[:, :120] += 100 * (rng.uniform(size=(12, 12)).repeat(10, 0).repeat(10, 1) > 0.5)
+    plain.frames.__class__ = type('Still', (Memory,), {'__getitem__': lambda self, _: values})
+    box = apply_challenge(plain, 'start_on_background').ground_truth[0]
+    x, y, width, height = np.round(box).astype(int)
+    assert values[y - 4:y + height + 4, x - 5:x + width + 5].std() < 5
+
+
+@pytest.mark.parametrize('paint, reason', [
+    (lambda values: values * 0, 'no place away from the target that is not all the same'),
+    (lambda values: values[:16, :19], 'too large for another place')])
+def test_no_start_where_there_is_no_other_place(paint, reason):
+    plain = sequence()
+    plain.frames.__class__ = type('Still', (Memory,), {
+        '__getitem__': lambda self, index: paint(Memory.__getitem__(self, index))})
+    with pytest.raises(SequenceError, match=reason):
+        apply_challenge(plain, 'start_on_background')
+
+
+def test_noise_is_new_in_each_frame_and_has_the_counts_of_the_scene():
+    plain, made = (make(sequence(dtype=np.uint16)) for make in (
+        lambda item: item, lambda item: apply_challenge(item, 'start_on_noise')))
+    assert np.array_equal(made.ground_truth[0], plain.ground_truth[0])
+    one, two, first = (item.astype(float) for item in (
+        made.frames[3], made.frames[4], plain.frames[0]))
+    assert abs(np.corrcoef(one.ravel(), two.ravel())[0, 1]) < 0.03
+    assert abs(np.corrcoef(one[:, 1:].ravel(), one[:, :-1].ravel())[0, 1]) < 0.03
+    assert one.mean() == pytest.approx(first.mean(), rel=0.02)
+    assert one.std() == pytest.approx(first.std(), rel=0.05)
 
 
 def test_shutter_repeats_a_frame_bit_for_bit():
@@ -300,7 +450,8 @@ def test_span_is_that_of_the_scene():
     assert 55 < span.low < 65 and 70 < span.high < 230
 
 
-@pytest.mark.parametrize('which', ['disappear_1s', 'disappear_3s', 'leave', 'cut'])
+@pytest.mark.parametrize('which', ['disappear_1s', 'disappear_3s', 'leave', 'leave_edge', 'cut',
+                                   'cut_other_view'])
 def test_short_sequences_are_refused_with_the_reason(which):
     with pytest.raises(SequenceError, match='needs at least|does not move'):
         apply_challenge(sequence(40), which)
@@ -311,6 +462,9 @@ def test_a_target_that_is_away_anyway_cannot_be_taken_away():
     made.ground_truth[90] = np.nan
     with pytest.raises(SequenceError, match='absent in frame 59 or 90'):
         apply_challenge(made, 'disappear_1s')
+    made.ground_truth[110] = np.nan
+    with pytest.raises(SequenceError, match='absent in frame 110, in which'):
+        apply_challenge(made, 'cut_other_view')
 
 
 def test_absent_targets_stay_absent(name):
@@ -318,7 +472,8 @@ def test_absent_targets_stay_absent(name):
     plain.ground_truth[30:34] = np.nan
     made = apply_challenge(plain, name)
     absent = is_absent(made.ground_truth)
-    assert absent[30:34].all() and not absent[:30].any()
+    assert absent[30:34].all() and not absent[0]
+    assert not absent[:30].any() or name.startswith('start_on')
     made.frames[31]
 
 
@@ -334,8 +489,9 @@ def test_names_are_chosen_once_or_all():
 def test_real_sequences_take_every_challenge(thermal_dev, folder):
     from lmsco_ros.evaluation.datasets import scan_dataset
     plain = scan_dataset(thermal_dev / folder).sequences[0].first(70)
-    for which in set(CHALLENGES) - {'disappear_3s', 'leave', 'cut'}:
+    for which in set(CHALLENGES) - {'disappear_3s', 'leave', 'leave_edge', 'cut',
+                                    'cut_other_view'}:
         made = apply_challenge(plain, which)
         truth = made.ground_truth[[10]]
-        assert overlaps(truth, plain.ground_truth[[10]])[0] == 1
+        assert which.startswith('start_on') or overlaps(truth, plain.ground_truth[[10]])[0] == 1
         assert made.frames[35].shape[:2] == plain.frames[35].shape[:2]
