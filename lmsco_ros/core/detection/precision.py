@@ -79,15 +79,14 @@ def _other_peak(detection: Detection,
     """Return the way (x, y) in periods to the highest other peak, and the chance that it is it."""
     grid, size = detection.peak.grid, detection.peak.grid.shape[0]
     middle = [round(t * size) for t in detection.peak.displacement]
-    reach = round(size * side / (2 * detection.region.width))
+    reach = min(round(size * side / (2 * detection.region.width)), (size - 2) // 2)
     around = np.arange(-reach, reach + 1)
+    own = ((middle[0] + around) % size)[:, None], (middle[1] + around) % size
     others = grid.astype(np.float64)
-    others[np.ix_((middle[0] + around) % size, (middle[1] + around) % size)] = -np.inf
-    row, column = np.unravel_index(np.argmax(others), others.shape)
+    mean = (others.sum() - others[own].sum()) / (others.size - around.size**2)
+    others[own] = -np.inf
+    row, column = divmod(int(others.argmax()), size)
     way = (np.array([column - middle[1], row - middle[0]]) / size + 0.5) % 1.0 - 0.5
-    rest = others[np.isfinite(others)]
-    if not rest.size or detection.sharpness <= 0:
-        return way, 0.0
-    error = (detection.peak.value - float(rest.mean())) / detection.sharpness
+    error = (detection.peak.value - mean) / max(detection.sharpness, 1e-6)
     lead = (detection.peak.value - float(others[row, column])) / max(error, 1e-12)
     return way, 0.5 * math.erfc(lead / 2)

@@ -128,7 +128,7 @@ def test_errors_in_noise_are_about_as_large_as_they_are_told_to_be(make_scene, n
     box = BoundingBox.from_center(start, target)
     detector = Detector(config, select_backend('cpu'), load_networks(config), view(start), box)
     errors = []
-    for _ in range(40):
+    for _ in range(25):
         center = tuple(np.array(start) + rng.uniform(-6, 6, 2))
         found = detector(view(center), box)
         error = np.array(found.center) - center
