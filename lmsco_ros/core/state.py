@@ -213,8 +213,9 @@ class TargetState:
         """Begin anew at a box, with a velocity that nobody knows."""
         count = len(covariance)
         self._mean = np.array([*box.center, *np.log(box.size), 0.0, 0.0])
-        self._covariance = np.diag(np.square(
-            [0.0, 0.0, _START_SIZE, _START_SIZE, *2 * [_START_SPEED * math.sqrt(box.area)]]))
+        self._covariance = np.zeros((6, 6))
+        self._covariance[_SIZE, _SIZE] = _START_SIZE**2 * np.eye(2)
+        self._covariance[_SPEED, _SPEED] = _START_SPEED**2 * box.area * np.eye(2)
         self._covariance[:count, :count] = _measurement(box, covariance)[1]
 
     def _noise(self, frames: float) -> _Array:
@@ -226,8 +227,9 @@ class TargetState:
         """
         gone = -math.expm1(-frames / _FADING)
         power = _MANEUVER**2 * self.box.area * _FADING / 2
-        noise = np.diag([0.0, 0.0, *2 * [_SIZE_CHANGE**2 * frames], 0.0, 0.0])
+        noise = np.zeros((6, 6))
         way = 2 * (frames / _FADING - gone) - gone**2
+        noise[_SIZE, _SIZE] = _SIZE_CHANGE**2 * frames * np.eye(2)
         noise[_PLACE, _PLACE] = power * _FADING**2 * max(way, 0.0) * np.eye(2)
         noise[_PLACE, _SPEED] = noise[_SPEED, _PLACE] = power * _FADING * gone**2 * np.eye(2)
         noise[_SPEED, _SPEED] = power * gone * (2 - gone) * np.eye(2)

@@ -221,6 +221,9 @@ def test_after_a_cut_the_target_may_be_anywhere_at_rest():
     assert state.box.center == pytest.approx((500, 400), abs=0.01)
     assert state.velocity == pytest.approx((0, 0), abs=0.1)
     assert state.covariance[0, 0] < 2
+    state.predict(1.0)
+    state.measure(START.moved_to((502, 401)), EXACT)
+    assert state.velocity == pytest.approx((2, 1), rel=0.1)
 
 
 def simulated(rng, frames, misses):
