@@ -96,7 +96,8 @@ def _case(name: str) -> str:
 def _figures(accuracy: OnePassSummary, word: ConfidenceSummary) -> list[str]:
     """Return the cells of one tracker."""
     auc = accuracy.success_auc
-    return [accuracy.tracker, f'{number(auc.value)} ({interval(auc)})',
+    spread = interval(auc)
+    return [accuracy.tracker, number(auc.value) + (f' ({spread})' if spread else ''),
             number(word.false_alarms.value, 2),
             f'{word.declared} of {word.departures}' if word.departures else NONE,
             number(word.delay, 0), number(word.claimed_share.value),

@@ -69,12 +69,12 @@ WARM_UP = 30
 class InstantTracker:
     """Answers at once: what remains is the node."""
 
-    def initialize(self, image: np.ndarray, box: BoundingBox) -> TrackResult:
+    def initialize(self, image: np.ndarray, box: BoundingBox, time: float) -> TrackResult:
         """Return the box."""
         self._box = box
-        return self.update(image)
+        return self.update(image, time)
 
-    def update(self, image: np.ndarray) -> TrackResult:
+    def update(self, image: np.ndarray, time: float) -> TrackResult:
         """Return the box again."""
         return TrackResult(self._box, 1.0, TrackState.TRACKING,
                            np.zeros((2, 2), np.float32), self._box)

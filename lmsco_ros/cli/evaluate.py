@@ -89,9 +89,10 @@ def evaluate(
     part: Annotated[str, typer.Option(help='Part of the split that is evaluated.')] = 'test',
     challenge: Annotated[list[str] | None, typer.Option(
         show_default='the sequences as they are',
-        help='Make the sequences harder: disappear_1s, disappear_3s, leave, cut, twin, '
-             'twin_remains, shutter, gain_jump, polarity, dead_pixels, telemetry, nan, text, '
-             'sixteen_bit or all. May be repeated.')] = None,
+        help='Make the sequences harder: disappear_1s, disappear_3s, leave, leave_edge, cut, '
+             'cut_other_view, twin, twin_crosses, twin_remains, shutter, gain_jump, noise_step, '
+             'contrast_step, stretch_step, polarity, dead_pixels, telemetry, nan, text, '
+             'sixteen_bit, start_on_background, start_on_noise or all. May be repeated.')] = None,
 ) -> None:
     """Run trackers over a dataset and report accuracy, robustness and speed."""
     with plain_errors():

@@ -147,9 +147,9 @@ def _results(tracker: LMSCOTracker, frames: Iterator[RecordedFrame], start: Boun
              ) -> Iterator[tuple[RecordedFrame, TrackResult, float]]:
     """Yield each frame with what the tracker says and the seconds it took."""
     for frame in frames:
-        began = time.perf_counter()
-        result = (tracker.update(frame.image) if tracker.initialized
-                  else tracker.initialize(frame.image, start))
+        began, taken = time.perf_counter(), 1e-9 * frame.stamp_ns
+        result = (tracker.update(frame.image, taken) if tracker.initialized
+                  else tracker.initialize(frame.image, start, taken))
         yield frame, result, time.perf_counter() - began
 
 

@@ -16,12 +16,13 @@
 
 from lmsco_ros.core.config import TrackerConfig
 from lmsco_ros.core.errors import (
-    BoxError, BusyError, ConfigError, ImageError, LMSCOError, NotInitializedError, WeightsError)
+    BoxError, BusyError, ConfigError, ImageError, LMSCOError, NotInitializedError, TimeError,
+    WeightsError)
 from lmsco_ros.core.tracker import LMSCOTracker
 from lmsco_ros.core.types import BoundingBox, TrackResult, TrackState
 
 __all__ = [
     'BoundingBox', 'BoxError', 'BusyError', 'ConfigError', 'ImageError', 'LMSCOError',
-    'LMSCOTracker', 'NotInitializedError', 'TrackerConfig', 'TrackResult', 'TrackState',
-    'WeightsError',
+    'LMSCOTracker', 'NotInitializedError', 'TimeError', 'TrackerConfig', 'TrackResult',
+    'TrackState', 'WeightsError',
 ]

@@ -31,6 +31,10 @@ class PointError(LMSCOError):
     """The point is not in the image, or nothing stands out from its surroundings there."""
 
 
+class TimeError(LMSCOError):
+    """The time of a frame is no number, or is given for some frames only."""
+
+
 class ConfigError(LMSCOError):
     """A configuration key is unknown or its value is out of range."""
 

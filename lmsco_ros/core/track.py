@@ -21,6 +21,7 @@ import numpy as np
 from lmsco_ros.core.backend import Backend
 from lmsco_ros.core.config import TrackerConfig
 from lmsco_ros.core.detection.detector import Detection, Detector
+from lmsco_ros.core.detection.precision import box_covariance
 from lmsco_ros.core.detection.scale import found_factor, scale_factors
 from lmsco_ros.core.extent.fusion import EdgeFilter
 from lmsco_ros.core.extent.measurement import ExtentMeter
@@ -32,6 +33,7 @@ from lmsco_ros.core.presence.monitor import PresenceMonitor
 from lmsco_ros.core.presence.observer import Observer, Outlook, Sighting
 from lmsco_ros.core.search.prediction import Prediction
 from lmsco_ros.core.search.redetection import Redetection
+from lmsco_ros.core.state import FrameClock, TargetState
 from lmsco_ros.core.types import BoundingBox, TrackResult, TrackState
 from lmsco_ros.core.weights.loading import Networks
 
@@ -54,6 +56,8 @@ class Track:
         First frame.
     box : BoundingBox
         Target in the first frame.
+    time : float, optional
+        When that frame was taken, in seconds; None where frames have no times.
 
     Raises
     ------
@@ -61,12 +65,15 @@ class Track:
         When the box is too small or not in the image.
     ImageError
         When there is nothing to see in the search region.
+    TimeError
+        When the time is no finite number.
 
     """
 
     def __init__(self, config: TrackerConfig, backend: Backend, networks: Networks,
-                 image: np.ndarray, box: BoundingBox) -> None:
+                 image: np.ndarray, box: BoundingBox, time: float | None = None) -> None:
         check_box(box, (image.shape[1], image.shape[0]))
+        self._clock, self._motion = FrameClock(time), TargetState(box)
         self._config = config
         self._box = box
         self._frame = 0
@@ -86,8 +93,9 @@ class Track:
         self._detector.watch(view, box)
         self.result = self._describe(view, first, 1.0, TrackState.TRACKING)
 
-    def advance(self, image: np.ndarray) -> TrackResult:
+    def advance(self, image: np.ndarray, time: float | None = None) -> TrackResult:
         """Find the target in the next frame, and learn from it if it can be trusted."""
+        self._motion.predict(self._clock.step(time))
         condition = self._gain.examine(image)
         if condition.shutter_closed:
             self._after_shutter = True
@@ -95,6 +103,7 @@ class Track:
         self._frame += 1
         if condition.cut:
             self._expect_nothing()
+            self._motion.forget_place((image.shape[1], image.shape[0]))
         view = FrameView(image, condition.intensity)
         outlook = Outlook(view, self._box, self._expected(view))
         sighting = self._look(outlook)
@@ -104,6 +113,7 @@ class Track:
         verdict = self._monitor.judge(sighting.assessment)
         if verdict.believed:
             self._follow(view, self._fused(view, sighting), verdict.state)
+            self._motion.measure(self._box, box_covariance(sighting.detection, self._box))
         else:
             self._prediction.missed()
         if verdict.learns:
@@ -158,5 +168,10 @@ class Track:
     def _describe(self, view: FrameView, detection: Detection, score: float,
                   state: TrackState) -> TrackResult:
         """Return what there is to say; the target in the first frame scores 1 in the map."""
-        return TrackResult(visible_part(self._box, view.size), score, state,
-                           centered_map(detection.peak.grid / self._first_peak), detection.region)
+        x, y = self._motion.velocity
+        return TrackResult(
+            visible_part(self._box, view.size), score, state,
+            centered_map(detection.peak.grid / self._first_peak), detection.region,
+            velocity=(self._clock.rate * x, self._clock.rate * y),
+            covariance=self._motion.covariance,
+            predicted_box=visible_part(clamp_box(self._motion.box, view.size), view.size))

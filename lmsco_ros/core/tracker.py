@@ -96,8 +96,8 @@ class LMSCOTracker:
         """Whether there is a target to follow."""
         return self._track is not None
 
-    def initialize(self, image: np.ndarray,
-                   box: BoundingBox | Sequence[float] | np.ndarray) -> TrackResult:
+    def initialize(self, image: np.ndarray, box: BoundingBox | Sequence[float] | np.ndarray,
+                   time: float | None = None) -> TrackResult:
         """
         Start to follow the target in `box`, in place of a former one.
 
@@ -108,6 +108,8 @@ class LMSCOTracker:
         box : BoundingBox, or four numbers
             The target in that frame, (x, y, width, height) in pixels. It may reach over the
             border, with a quarter of its area inside, but not be larger than the image.
+        time : float, optional
+            When the frame was taken, in seconds on any clock; then every frame has a time.
 
         Returns
         -------
@@ -117,18 +119,19 @@ class LMSCOTracker:
 
         Raises
         ------
-        ImageError, BoxError
-            When nothing can be learned from the box; a former target is kept.
+        ImageError, BoxError, TimeError
+            When nothing can be learned from the box, or the time is no number; a former target
+            is kept.
 
         """
         with self._alone():
             frame = read_frame(image)
             track = Track(self.config, self._backend, self._networks, frame.pixels,
-                          BoundingBox.of(box))
+                          BoundingBox.of(box), time)
             self._track, self._kind = track, frame.kind
             return track.result
 
-    def update(self, image: np.ndarray) -> TrackResult:
+    def update(self, image: np.ndarray, time: float | None = None) -> TrackResult:
         """
         Find the target in the next frame.
 
@@ -136,13 +139,17 @@ class LMSCOTracker:
         ----------
         image : ndarray
             Frame of the same size and type as the first one.
+        time : float, optional
+            When it was taken, in seconds on the clock of the first frame; where frames have no
+            times, the motion is told per frame. A time that is not later than that of the frame
+            before counts as one frame of 30 a second.
 
         Raises
         ------
         NotInitializedError
             When there is no target.
-        ImageError
-            When the frame does not fit the first one; the target is kept.
+        ImageError, TimeError
+            When the frame or its time does not fit the first one; the target is kept.
 
         """
         with self._alone():
@@ -152,7 +159,7 @@ class LMSCOTracker:
             if frame.kind != self._kind:
                 raise ImageError(f'the frame is {frame.kind}, but the target was initialized in '
                                  f'{self._kind}; initialize again')
-            return self._track.advance(frame.pixels)
+            return self._track.advance(frame.pixels, time)
 
     def reset(self) -> None:
         """Forget the target."""

@@ -170,6 +170,18 @@ class TrackResult:
         covers one n-th of the region in each direction.
     search_region : BoundingBox
         Region of the image that `confidence_map` covers; may exceed the image.
+    velocity : tuple of float or None
+        Velocity (x, y) of the center, in pixels per second where frames have times, else per
+        frame.
+    covariance : ndarray, shape (4, 4), or None
+        Covariance of center x, center y, width and height of `predicted_box`, in px^2.
+    predicted_box : BoundingBox or None
+        The target in this frame by its motion and what was measured: close to `box` while the
+        target is seen, and where it has gone on to meanwhile, as far as one can tell, when not.
+
+    Notes
+    -----
+    The last three are None only in results that no tracker has made.
 
     """
 
@@ -178,3 +190,6 @@ class TrackResult:
     state: TrackState
     confidence_map: npt.NDArray[np.float32]
     search_region: BoundingBox
+    velocity: tuple[float, float] | None = None
+    covariance: npt.NDArray[np.float64] | None = None
+    predicted_box: BoundingBox | None = None

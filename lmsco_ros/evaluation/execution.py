@@ -101,6 +101,8 @@ class _Recorder:
         self._boxes = np.full((self.frames, 4), np.nan)
         self._scores = np.full(self.frames, np.nan)
         self._lost = np.zeros(self.frames, dtype=bool)
+        self._predicted = np.full((self.frames, 4), np.nan)
+        self._covariances = np.full((self.frames, 4, 4), np.nan)
         self._starts: list[int] = []
         self._updates = 0
         self._wall = 0.0
@@ -144,6 +146,7 @@ class _Recorder:
     def trace(self, failures: tuple[int, ...]) -> Trace:
         """Return what was written down."""
         return Trace(boxes=self._boxes, scores=self._scores, lost=self._lost,
+                     predicted=self._predicted, covariances=self._covariances,
                      starts=tuple(self._starts), failures=failures, updates=self._updates,
                      cpu_seconds=self._cpu, wall_seconds=self._wall,
                      error='; '.join(self._errors) or None)
@@ -160,6 +163,9 @@ class _Recorder:
         if answer.score is not None:
             self._scores[index] = answer.score
         self._lost[index] = answer.state is TrackState.LOST
+        if answer.predicted_box is not None and answer.covariance is not None:
+            self._predicted[index] = answer.predicted_box.as_tuple()
+            self._covariances[index] = answer.covariance
 
     def _note(self, index: int, error: Exception) -> bool:
         self._errors.append(f'frame {index}: {type(error).__name__}: {error}')

@@ -248,7 +248,9 @@ def _context(content: Any) -> Mapping[str, Any]:
         whole_number(number or 0)
     for item in the_list(content.get('skipped', [])):
         the_text(item['name'] + item['reason'])
-    for word in (*the_list(content.get('challenges', [])), content.get('sequences', '')):
+    groups = [name for names in the_object(content.get('scenes', {})).values()
+              for name in the_list(names)]
+    for word in (*the_list(content.get('challenges', [])), content.get('sequences', ''), *groups):
         the_text(word)
     return content
 

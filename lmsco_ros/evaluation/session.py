@@ -181,7 +181,8 @@ def describe(request: Request, jobs: int, skipped: Sequence[BrokenSequence]) -> 
     return {
         'dataset': request.dataset.resolve().name, 'sequences': request.pattern,
         'frames': request.frames,
-        **({'split': request.split.name, 'part': request.part} if request.split else {}),
+        **({'split': request.split.name, 'part': request.part,
+            'scenes': load_split(request.split).scenes} if request.split else {}),
         'challenges': list(request.challenges), 'jobs': jobs,
         'anchors': None if request.anchors is None else asdict(request.anchors),
         'date': date.today().isoformat(), 'machine': machine(), 'versions': dict(versions()),

@@ -27,6 +27,9 @@ from lmsco_ros.evaluation.plain_values import (
     box_rows, number, numbers, the_list, the_text, whole_number, whole_numbers)
 
 _DECIMALS = 4
+_DIGITS = 5
+# What a symmetric matrix is stored as.
+_ROWS, _COLUMNS = np.triu_indices(4)
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,6 +55,11 @@ class Trace:
     error : str or None
         What a crash said; frames from there on have no answer in the one-pass protocol
         and count as a failure in the supervised one.
+    predicted : ndarray, shape (n, 4), or None
+        Where the tracker took the target to be, also while it was lost; NaN where it did not
+        say, None where it never does.
+    covariances : ndarray, shape (n, 4, 4), or None
+        Of center x, center y, width and height of these boxes, in px^2.
 
     """
 
@@ -64,6 +72,8 @@ class Trace:
     cpu_seconds: float = 0.0
     wall_seconds: float = 0.0
     error: str | None = None
+    predicted: npt.NDArray[np.float64] | None = None
+    covariances: npt.NDArray[np.float64] | None = None
 
     @classmethod
     def unanswered(cls, frames: int, error: str) -> Trace:
@@ -83,7 +93,18 @@ class Trace:
             'cpu_seconds': None if np.isnan(self.cpu_seconds) else self.cpu_seconds,
             'wall_seconds': self.wall_seconds,
             'error': self.error,
+            'predicted': self._written(self.predicted),
+            'covariances': self._written(
+                None if self.covariances is None else self.covariances[:, _ROWS, _COLUMNS]),
         }
+
+    @staticmethod
+    def _written(rows: npt.NDArray[np.float64] | None) -> list[list[float] | None] | None:
+        """Return rows of numbers, None for those of NaN; None where all of them are."""
+        if rows is None or not np.isfinite(rows).any():
+            return None
+        return [[float(f'{value:.{_DIGITS}g}') for value in row]
+                if np.isfinite(row).all() else None for row in rows]
 
     @classmethod
     def from_json(cls, content: Mapping[str, Any]) -> Trace:
@@ -102,13 +123,32 @@ class Trace:
         lost = np.zeros(len(scores), dtype=bool)
         lost[whole_numbers(content['lost'], len(scores))] = True
         error, seconds = content['error'], content['cpu_seconds']
+        predicted, covariances = _motion(content, len(scores))
         return cls(boxes=boxes, scores=scores, lost=lost,
                    starts=tuple(whole_numbers(content['starts'], len(scores))),
                    failures=tuple(whole_numbers(content['failures'], len(scores))),
                    updates=whole_number(content['updates']),
                    cpu_seconds=np.nan if seconds is None else number(seconds),
                    wall_seconds=number(content['wall_seconds']),
-                   error=None if error is None else the_text(error))
+                   error=None if error is None else the_text(error),
+                   predicted=predicted, covariances=covariances)
+
+
+def _motion(content: Mapping[str, Any], frames: int) -> tuple[
+        npt.NDArray[np.float64] | None, npt.NDArray[np.float64] | None]:
+    """Return predicted boxes and their covariances, None in records of trackers without them."""
+    if content.get('predicted') is None and content.get('covariances') is None:
+        return None, None
+    predicted = box_rows(content['predicted'])
+    rows = [[None] * len(_ROWS) if row is None else the_list(row)
+            for row in the_list(content['covariances'])]
+    if len(predicted) != frames or len(rows) != frames or any(
+            len(row) != len(_ROWS) for row in rows):
+        raise ValueError(f'predicted boxes and covariances are not those of {frames} frames')
+    covariances = np.empty((frames, 4, 4))
+    values = numbers(item for row in rows for item in row).reshape(frames, -1)
+    covariances[:, _ROWS, _COLUMNS] = covariances[:, _COLUMNS, _ROWS] = values
+    return predicted, covariances
 
 
 def _plain(values: npt.NDArray[np.float64]) -> list[float | None]:

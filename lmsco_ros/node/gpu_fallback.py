@@ -53,19 +53,20 @@ class FallbackTracker:
         self._make = make
         self._device = device
         self._warn = warn
-        self._found: tuple[npt.NDArray, BoundingBox] | None = None
+        self._found: tuple[npt.NDArray, BoundingBox, float] | None = None
         self._attempt(lambda: self._use(make(device)))
 
-    def initialize(self, image: npt.NDArray, box: BoundingBox) -> TrackResult:
-        """Start on a target."""
-        result = self._attempt(lambda: self._tracker.initialize(image, box)) \
-            or self._tracker.initialize(image, box)
-        return self._noted(image, result)
+    def initialize(self, image: npt.NDArray, box: BoundingBox, time: float) -> TrackResult:
+        """Start on a target in a frame that was taken at a time, in seconds."""
+        result = self._attempt(lambda: self._tracker.initialize(image, box, time)) \
+            or self._tracker.initialize(image, box, time)
+        return self._noted(image, result, time)
 
-    def update(self, image: npt.NDArray) -> TrackResult:
+    def update(self, image: npt.NDArray, time: float) -> TrackResult:
         """Find the target in the next frame."""
-        result = self._attempt(lambda: self._tracker.update(image)) or self._resume(image)
-        return self._noted(image, result)
+        result = self._attempt(lambda: self._tracker.update(image, time)) \
+            or self._resume(image, time)
+        return self._noted(image, result, time)
 
     def _attempt(self, work: Callable[[], TrackResult | None]) -> TrackResult | None:
         """Return what comes of the work; None after a retreat to the processor."""
@@ -88,19 +89,19 @@ class FallbackTracker:
     def _use(self, tracker: Tracker) -> None:
         self._tracker = tracker
 
-    def _resume(self, image: npt.NDArray) -> TrackResult:
+    def _resume(self, image: npt.NDArray, time: float) -> TrackResult:
         # Nothing is updated before a start, of which the frame is kept.
         assert self._found is not None
         self._tracker.initialize(*self._found)
         self._found = None
-        return self._tracker.update(image)
+        return self._tracker.update(image, time)
 
-    def _noted(self, image: npt.NDArray, result: TrackResult) -> TrackResult:
+    def _noted(self, image: npt.NDArray, result: TrackResult, time: float) -> TrackResult:
         """Keep the newest frame that shows the target, for as long as there is a way back."""
         if self._device != 'cpu' and result.state is not TrackState.LOST:
             # A copy, as the tracker keeps nothing of an image either: this one may be a part of
             # a larger message, or be written over by the next frame.
-            self._found = image.copy(), result.box
+            self._found = image.copy(), result.box, time
         return result
 
 

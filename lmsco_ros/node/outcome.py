@@ -28,10 +28,10 @@ from lmsco_ros.core.types import BoundingBox, TrackResult
 class Tracker(Protocol):
     """The part of the tracker that the node uses."""
 
-    def initialize(self, image: npt.NDArray, box: BoundingBox) -> TrackResult:
-        """Start on a target."""
+    def initialize(self, image: npt.NDArray, box: BoundingBox, time: float) -> TrackResult:
+        """Start on a target in a frame that was taken at a time, in seconds."""
 
-    def update(self, image: npt.NDArray) -> TrackResult:
+    def update(self, image: npt.NDArray, time: float) -> TrackResult:
         """Find the target in the next frame."""
 
 
@@ -85,6 +85,11 @@ class PendingFrame:
     def nbytes(self) -> int:
         """Memory that it takes while it waits, in bytes."""
         return self.picture.nbytes
+
+    @property
+    def seconds(self) -> float:
+        """When it was taken, in seconds."""
+        return 1e-9 * self.stamp
 
 
 class Phase(Enum):

@@ -263,7 +263,8 @@ class TrackerWorker:
         elif self._target_of != self._orders.resets:
             self._report(item, Phase.IDLE, image=image, started=started)
         else:
-            self._track(item, image, lambda: self._tracker.update(image), started)
+            self._track(item, image, lambda: self._tracker.update(image, item.frame.seconds),
+                        started)
 
     def _begin(self, item: Start, image: npt.NDArray, started: float) -> None:
         if not item.orders.enabled:
@@ -272,7 +273,7 @@ class TrackerWorker:
             return
 
         def start() -> TrackResult:
-            result = self._tracker.initialize(image, item.request.box)
+            result = self._tracker.initialize(image, item.request.box, item.frame.seconds)
             self._track_id += 1
             self._target_of = item.orders.resets
             return result

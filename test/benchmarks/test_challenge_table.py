@@ -27,11 +27,11 @@ from lmsco_ros.evaluation.trace import Trace
 from lmsco_ros.evaluation.whole_file import write_json
 
 
-def evaluation(folder, challenge, lost):
-    """Write an evaluation of one sequence, with the target away in frames 10 to 19."""
+def evaluation(folder, challenge, lost, away=slice(10, 20)):
+    """Write an evaluation of one sequence, with the target away in some frames."""
     truth = np.tile([10., 10., 8., 8.], (60, 1))
     boxes = truth.copy()
-    truth[10:20] = np.nan
+    truth[away] = np.nan
     states = np.zeros(60, bool)
     states[lost] = True
     trace = Trace(np.where(states[:, None], np.nan, boxes), np.full(60, 0.5), states, (0,),
@@ -51,6 +51,12 @@ def test_cases_stand_in_their_order_with_their_figures(tmp_path):
     assert [row[0].split(':')[0] for row in rows] == ['as recorded', '`disappear_3s`']
     assert [row[5:] for row in rows] == [['1 of 1', '2', '.200', '1 of 1', '0'],
                                          ['1 of 1', '4', '.400', '1 of 1', '2']]
+
+
+def test_start_on_nothing_has_no_accuracy(tmp_path):
+    folder = evaluation(tmp_path / 'a', 'start_on_noise', slice(9, 60), away=slice(1, 60))
+    row = challenge_table([folder]).splitlines()[2].strip('| ').split(' | ')
+    assert row[3:] == ['–', '.00', '1 of 1', '8', '.136', '–', '–']
 
 
 def test_folder_without_an_evaluation_is_named(tmp_path):

@@ -50,6 +50,19 @@ def test_follows_the_target_of_a_folder(lmsco, tmp_path, scene_folder, scene, st
     assert cv2.imread(str(tmp_path / 'run' / 'summary.png')) is not None
 
 
+def test_tracker_knows_the_times_of_the_frames(lmsco, tmp_path, scene_folder, start, monkeypatch):
+    from lmsco_ros.core import LMSCOTracker
+
+    times = []
+    for name in ('initialize', 'update'):
+        def noted(tracker, *given, work=getattr(LMSCOTracker, name)):
+            times.append(given[-1])
+            return work(tracker, *given)
+        monkeypatch.setattr(LMSCOTracker, name, noted)
+    lmsco('track', scene_folder, '--init', start, '--output', tmp_path / 'run', '--frames', 3)
+    assert times == pytest.approx([0.0, 1 / 30, 2 / 30])
+
+
 def test_ground_truth_starts_and_judges(lmsco, tmp_path, scene_folder, truth):
     outcome = lmsco('track', scene_folder, '--ground-truth', truth, '--frames', 6,
                     '--output', tmp_path / 'run')

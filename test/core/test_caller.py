@@ -208,10 +208,10 @@ def busy(scene, monkeypatch):
     inside, done = Event(), Event()
     advance = Track.advance
 
-    def wait(track, image):
+    def wait(track, *frame):
         inside.set()
         done.wait(60)
-        return advance(track, image)
+        return advance(track, *frame)
     tracker = LMSCOTracker('hcs')
     tracker.initialize(scene.frame((40, 60)), BOX)
     monkeypatch.setattr(Track, 'advance', wait)

@@ -22,7 +22,7 @@ import numpy as np
 import pytest
 
 from lmsco_ros.core import (
-    BoundingBox, BoxError, ImageError, LMSCOError, LMSCOTracker, NotInitializedError,
+    BoundingBox, BoxError, ImageError, LMSCOError, LMSCOTracker, NotInitializedError, TimeError,
     TrackerConfig, TrackResult, TrackState)
 from lmsco_ros.core.config import (
     ChannelConfig, FeatureConfig, LearningConfig, SamplingConfig, ScaleConfig, SearchConfig)
@@ -67,6 +67,41 @@ def walk(scene, count, config=FAST, convert=lambda image: image):
         image.flags.writeable = False
         results.append(runner.initialize(image, box_of()) if n == 0 else runner.update(image))
     return results
+
+
+def test_motion_is_told_per_frame_or_per_second(scene):
+    plain, timed = LMSCOTracker(FAST), LMSCOTracker(FAST)
+    for n in range(12):
+        image = scene.frame((CENTER[0] + n, CENTER[1]))
+        results = [runner.update(image, *time) if n else runner.initialize(image, box_of(), *time)
+                   for runner, time in ((plain, ()), (timed, (50 + 0.1 * n,)))]
+    one, other = results
+    assert one.box == other.box and one.score == other.score
+    assert one.velocity == pytest.approx((1.0, 0.0), abs=0.1)
+    assert other.velocity == pytest.approx((10.0, 0.0), abs=1.0)
+    assert one.predicted_box.overlap(one.box) > 0.95 and one.covariance.shape == (4, 4)
+
+
+def test_lost_target_goes_on_as_a_prediction_that_knows_less_and_less(make_scene, tracker):
+    scene = make_scene(clutter=150.0)
+    for n in range(12):
+        image = scene.frame((CENTER[0] + n, CENTER[1]))
+        tracker.update(image) if n else tracker.initialize(image, box_of())
+    gone = [tracker.update(scene.frame(pan=(0.1 * n, 0))) for n in range(10)]
+    assert gone[-1].state is TrackState.LOST and gone[-1].box == gone[0].box
+    assert gone[-1].predicted_box.center[0] > gone[-1].box.center[0] + 5
+    steps = [np.linalg.eigvalsh(b.covariance - a.covariance) for a, b in zip(gone, gone[1:])]
+    assert np.min(steps) > 0
+
+
+def test_time_that_does_not_fit_is_refused_and_the_target_kept(scene, tracker):
+    with pytest.raises(TimeError, match="the time of the frame is 'now'"):
+        tracker.initialize(scene.frame(CENTER), box_of(), 'now')
+    assert not tracker.initialized
+    tracker.initialize(scene.frame(CENTER), box_of(), 1.0)
+    with pytest.raises(TimeError, match='give the time of every frame'):
+        tracker.update(later(scene))
+    assert tracker.update(later(scene), 2.0).box.overlap(box_of()) > 0.9
 
 
 def test_first_result_is_the_given_box(scene, tracker):

@@ -22,8 +22,8 @@ import numpy as np
 import pytest
 
 from lmsco_ros.core import (
-    BoundingBox, BoxError, ConfigError, ImageError, LMSCOError, NotInitializedError, TrackResult,
-    TrackState)
+    BoundingBox, BoxError, ConfigError, ImageError, LMSCOError, NotInitializedError, TimeError,
+    TrackResult, TrackState)
 
 coordinate = st.floats(-1e4, 1e4)
 length = st.floats(1e-2, 1e4)
@@ -94,7 +94,7 @@ def test_values_do_not_change():
 
 
 def test_errors_share_a_base_that_is_a_value_error():
-    for error in (BoxError, ConfigError, ImageError, NotInitializedError):
+    for error in (BoxError, ConfigError, ImageError, NotInitializedError, TimeError):
         assert issubclass(error, LMSCOError) and issubclass(error, ValueError)
 
 

@@ -21,6 +21,7 @@ import numpy as np
 import pytest
 
 SIZE = (64, 48)
+WALK_SIZE = (160, 120)
 
 # A tracker that is right until it is told otherwise by what the image shows: pixel
 # (0, 0) holds a command, the next four the true box.
@@ -106,6 +107,54 @@ def write_vot(folder, commands, boxes=None):
 def vot_folder():
     """Return the function that writes a VOT folder."""
     return write_vot
+
+
+class WalkingTarget:
+    """Images that are drawn when asked for: a bright target that moves over a soft ground."""
+
+    signature = 'memory'
+
+    def __init__(self, boxes, dtype=np.uint8, channels=1):
+        self.boxes, self.dtype, self.channels = boxes.copy(), dtype, channels
+
+    def __len__(self):
+        return len(self.boxes)
+
+    def __getitem__(self, index):
+        noise = np.random.default_rng(index).integers(-2, 3, WALK_SIZE[::-1])
+        image = 60 + np.arange(WALK_SIZE[0]) // 8 + noise
+        x, y, width, height = np.round(self.boxes[index]).astype(int)
+        image[y:y + height, x:x + width] = 220
+        image = image.astype(self.dtype)
+        return image if self.channels == 1 else np.repeat(image[..., None], 3, axis=2)
+
+
+def walk(frames=150, dtype=np.uint8, channels=1, name='walk'):
+    """Return a target of 10 x 8 pixels that moves to the right and down."""
+    from lmsco_ros.evaluation.datasets import TrackingSequence
+
+    steps = np.arange(frames)
+    boxes = np.stack([15 + 0.5 * steps, 40 + 0.2 * steps, np.full(frames, 10.),
+                      np.full(frames, 8.)], axis=1)
+    return TrackingSequence(name, 'group', WalkingTarget(boxes, dtype, channels), boxes)
+
+
+def well_inside(image, box):
+    """Return the pixels well within a box."""
+    x, y, width, height = np.round(box).astype(int)
+    return image[y + 1:y + height - 1, x + 1:x + width - 1]
+
+
+@pytest.fixture(scope='session')
+def sequence():
+    """Return the function that makes a sequence in memory, drawn when asked for."""
+    return walk
+
+
+@pytest.fixture(scope='session')
+def inside():
+    """Return the function of an image and a box to the pixels well within the box."""
+    return well_inside
 
 
 @pytest.fixture

@@ -24,47 +24,12 @@ import pytest
 from lmsco_ros.evaluation.challenges import apply_challenge, challenge_names, CHALLENGES
 from lmsco_ros.evaluation.challenges.intensities import Span, stored
 from lmsco_ros.evaluation.challenges.regions import with_copy, without_region
-from lmsco_ros.evaluation.datasets import TrackingSequence
 from lmsco_ros.evaluation.errors import DatasetError, SequenceError
 from lmsco_ros.evaluation.geometry import is_absent, overlaps
 
 SIZE = (160, 120)
 FRAMES = 150
-GROUND, TARGET = 60, 220
-
-
-class Memory:
-    """Images that are drawn when asked for: a bright target that moves over a soft ground."""
-
-    signature = 'memory'
-
-    def __init__(self, boxes, dtype=np.uint8, channels=1):
-        self.boxes, self.dtype, self.channels = boxes.copy(), dtype, channels
-
-    def __len__(self):
-        return len(self.boxes)
-
-    def __getitem__(self, index):
-        noise = np.random.default_rng(index).integers(-2, 3, SIZE[::-1])
-        image = GROUND + np.arange(SIZE[0]) // 8 + noise
-        x, y, width, height = np.round(self.boxes[index]).astype(int)
-        image[y:y + height, x:x + width] = TARGET
-        image = image.astype(self.dtype)
-        return image if self.channels == 1 else np.repeat(image[..., None], 3, axis=2)
-
-
-def sequence(frames=FRAMES, dtype=np.uint8, channels=1, name='walk'):
-    """Return a target of 10 x 8 pixels that moves to the right and down."""
-    steps = np.arange(frames)
-    boxes = np.stack([15 + 0.5 * steps, 40 + 0.2 * steps, np.full(frames, 10.),
-                      np.full(frames, 8.)], axis=1)
-    return TrackingSequence(name, 'group', Memory(boxes, dtype, channels), boxes)
-
-
-def inside(image, box):
-    """Return the pixels well within a box."""
-    x, y, width, height = np.round(box).astype(int)
-    return image[y + 1:y + height - 1, x + 1:x + width - 1]
+TARGET = 220
 
 
 @pytest.fixture(params=CHALLENGES)
@@ -73,7 +38,7 @@ def name(request):
     return request.param
 
 
-def test_frames_are_the_same_in_any_order_and_in_any_process(name):
+def test_frames_are_the_same_in_any_order_and_in_any_process(name, sequence):
     plain = sequence()
     made = apply_challenge(plain, name)
     other = pickle.loads(pickle.dumps(apply_challenge(sequence(), name)))
@@ -88,12 +53,12 @@ def test_frames_are_the_same_in_any_order_and_in_any_process(name):
         made.frames[len(made)]
 
 
-def test_no_two_challenges_share_a_fingerprint():
+def test_no_two_challenges_share_a_fingerprint(sequence):
     prints = {apply_challenge(sequence(), name).fingerprint for name in CHALLENGES}
     assert len(prints | {sequence().fingerprint}) == len(CHALLENGES) + 1
 
 
-def test_a_fingerprint_knows_the_truth_that_is_hidden():
+def test_a_fingerprint_knows_the_truth_that_is_hidden(sequence):
     made, other = sequence(), sequence()
     other.ground_truth[75] += 1
     one, two = (apply_challenge(item, 'disappear_1s') for item in (made, other))
@@ -103,7 +68,7 @@ def test_a_fingerprint_knows_the_truth_that_is_hidden():
 
 @pytest.mark.parametrize(('dtype', 'channels'), [
     (np.uint8, 3), (np.uint16, 1), (np.float32, 1)])
-def test_every_depth_is_taken_and_stays(name, dtype, channels):
+def test_every_depth_is_taken_and_stays(name, dtype, channels, sequence):
     made = apply_challenge(sequence(dtype=dtype, channels=channels), name)
     image = made.frames[75]
     expected = {'nan': np.float32, 'sixteen_bit': np.uint16}.get(name, dtype)
@@ -112,7 +77,7 @@ def test_every_depth_is_taken_and_stays(name, dtype, channels):
 
 
 @pytest.mark.parametrize(('which', 'count'), [('disappear_1s', 30), ('disappear_3s', 90)])
-def test_the_target_disappears_and_is_back(which, count):
+def test_the_target_disappears_and_is_back(which, count, sequence, inside):
     plain, made = sequence(), apply_challenge(sequence(), which)
     absent = np.flatnonzero(is_absent(made.ground_truth))
     assert absent.tolist() == list(range((150 - count) // 2, (150 + count) // 2))
@@ -133,8 +98,8 @@ def test_filled_background_has_the_noise_around_it():
     assert np.array_equal(filled[:24], image[:24])
 
 
-@given(st.tuples(*[st.floats(-30, 190)] * 2), st.tuples(*[st.floats(2, 90)] * 2))
-def test_regions_may_reach_over_the_border(corner, size):
+@given(corner=st.tuples(*[st.floats(-30, 190)] * 2), size=st.tuples(*[st.floats(2, 90)] * 2))
+def test_regions_may_reach_over_the_border(corner, size, sequence):
     box = np.array([*corner, *size])
     image = sequence().frames[0]
     for made in (without_region(image, box, np.random.default_rng(1)),
@@ -142,7 +107,7 @@ def test_regions_may_reach_over_the_border(corner, size):
         assert made.shape == image.shape and made.dtype == image.dtype
 
 
-def test_cut_makes_the_target_jump():
+def test_cut_makes_the_target_jump(sequence):
     plain, made = sequence(), apply_challenge(sequence(), 'cut')
     assert len(made) < FRAMES
     steps = np.linalg.norm(np.diff(made.ground_truth[:, :2], axis=0), axis=1)
@@ -154,7 +119,7 @@ def test_cut_makes_the_target_jump():
         apply_challenge(still, 'cut')
 
 
-def test_twin_is_a_second_target_that_never_covers_the_first():
+def test_twin_is_a_second_target_that_never_covers_the_first(sequence, inside):
     made = apply_challenge(sequence(), 'twin')
     assert np.array_equal(made.ground_truth, sequence().ground_truth)
     centers = []
@@ -174,7 +139,7 @@ def test_twin_is_a_second_target_that_never_covers_the_first():
     assert np.ptp(centers, axis=0).min() > 5 and steps.max() < 8
 
 
-def test_the_twin_remains_where_the_target_disappears():
+def test_the_twin_remains_where_the_target_disappears(sequence):
     made, both = (apply_challenge(sequence(), which) for which in ('twin_remains', 'twin'))
     for index in (30, 60, 75, 89, 120):
         image, absent = made.frames[index], is_absent(made.ground_truth[[index]])[0]
@@ -184,7 +149,7 @@ def test_the_twin_remains_where_the_target_disappears():
         assert absent or np.array_equal(image, both.frames[index])
 
 
-def test_leaving_shows_the_target_where_the_truth_says_and_nowhere_else():
+def test_leaving_shows_the_target_where_the_truth_says_and_nowhere_else(sequence, inside):
     made = apply_challenge(sequence(), 'leave')
     absent = is_absent(made.ground_truth)
     assert 30 <= absent.sum() < 70 and not absent[:40].any() and not absent[-40:].any()
@@ -199,14 +164,15 @@ def test_leaving_shows_the_target_where_the_truth_says_and_nowhere_else():
             assert (inside(image, box) == TARGET).all()
 
 
-def test_a_target_that_fills_the_image_cannot_leave_it():
+@pytest.mark.parametrize('which', ['leave', 'leave_edge'])
+def test_a_target_that_fills_the_image_cannot_leave_it(which, sequence):
     made = sequence()
     made.ground_truth[:] = 30, 20, 90, 80
     with pytest.raises(SequenceError, match='too large'):
-        apply_challenge(made, 'leave')
+        apply_challenge(made, which)
 
 
-def test_shutter_repeats_a_frame_bit_for_bit():
+def test_shutter_repeats_a_frame_bit_for_bit(sequence, inside):
     made = apply_challenge(sequence(), 'shutter')
     same = [np.array_equal(made.frames[index], made.frames[index - 1])
             for index in range(1, FRAMES)]
@@ -216,7 +182,7 @@ def test_shutter_repeats_a_frame_bit_for_bit():
     assert np.array_equal(made.ground_truth[72], sequence().ground_truth[72])
 
 
-def test_gain_jumps_every_twenty_frames_only():
+def test_gain_jumps_every_twenty_frames_only(sequence):
     plain, made = sequence(), apply_challenge(sequence(), 'gain_jump')
     # A line through counts of the plain image gives gain and offset of each frame.
     lines = np.array([np.polyfit(plain.frames[index].ravel().astype(float),
@@ -228,7 +194,7 @@ def test_gain_jumps_every_twenty_frames_only():
     assert len(set(lines[::4, 0].round(2))) == 5
 
 
-def test_polarity_switches_and_switches_back():
+def test_polarity_switches_and_switches_back(sequence):
     plain, made = sequence(), apply_challenge(sequence(), 'polarity')
     for index in (0, 49, 50, 99, 100, 149):
         image = plain.frames[index]
@@ -236,7 +202,7 @@ def test_polarity_switches_and_switches_back():
         assert np.array_equal(made.frames[index], expected)
 
 
-def test_dead_pixels_stay_where_they_are():
+def test_dead_pixels_stay_where_they_are(sequence):
     plain, made = sequence(), apply_challenge(sequence(), 'dead_pixels')
     changed = [made.frames[index] != plain.frames[index] for index in (0, 60, 149)]
     values = made.frames[0][changed[0]]
@@ -246,7 +212,7 @@ def test_dead_pixels_stay_where_they_are():
     assert 0.02 < changed[0].mean() < 0.04
 
 
-def test_telemetry_changes_the_first_rows_only():
+def test_telemetry_changes_the_first_rows_only(sequence):
     plain, made = sequence(dtype=np.uint16), apply_challenge(sequence(dtype=np.uint16),
                                                              'telemetry')
     one, two = made.frames[3], made.frames[4]
@@ -254,13 +220,13 @@ def test_telemetry_changes_the_first_rows_only():
     assert one[:4].std() > 15000 and not np.array_equal(one[:4], two[:4])
 
 
-def test_spots_have_no_value():
+def test_spots_have_no_value(sequence):
     image = apply_challenge(sequence(), 'nan').frames[9]
     assert np.isnan(image).any() and np.isposinf(image).any() and np.isneginf(image).any()
     assert 0.9 < np.isfinite(image).mean() < 1
 
 
-def test_text_runs_and_blinks():
+def test_text_runs_and_blinks(sequence):
     plain, made = sequence(), apply_challenge(sequence(), 'text')
     x, y = np.nanmean(plain.ground_truth[:, :2], axis=0).astype(int)
 
@@ -274,7 +240,7 @@ def test_text_runs_and_blinks():
     assert not np.array_equal(made.frames[0][:12] > 200, made.frames[8][:12] > 200)
 
 
-def test_sixteen_bit_keeps_the_picture_in_few_counts_that_drift():
+def test_sixteen_bit_keeps_the_picture_in_few_counts_that_drift(sequence):
     plain, made = sequence(), apply_challenge(sequence(), 'sixteen_bit')
     offsets = []
     for index in range(0, FRAMES, 10):
@@ -294,31 +260,36 @@ def test_stored_values_are_rounded_and_cut(values, dtype):
     np.testing.assert_allclose(image, np.clip(values, *limits), atol=0.51)
 
 
-def test_span_is_that_of_the_scene():
+def test_span_is_that_of_the_scene(sequence):
     assert Span.of(sequence()) == Span(0, 255)
     span = Span.of(sequence(dtype=np.uint16))
     assert 55 < span.low < 65 and 70 < span.high < 230
 
 
-@pytest.mark.parametrize('which', ['disappear_1s', 'disappear_3s', 'leave', 'cut'])
-def test_short_sequences_are_refused_with_the_reason(which):
+@pytest.mark.parametrize('which', ['disappear_1s', 'disappear_3s', 'leave', 'leave_edge', 'cut',
+                                   'cut_other_view'])
+def test_short_sequences_are_refused_with_the_reason(which, sequence):
     with pytest.raises(SequenceError, match='needs at least|does not move'):
         apply_challenge(sequence(40), which)
 
 
-def test_a_target_that_is_away_anyway_cannot_be_taken_away():
+def test_a_target_that_is_away_anyway_cannot_be_taken_away(sequence):
     made = sequence()
     made.ground_truth[90] = np.nan
     with pytest.raises(SequenceError, match='absent in frame 59 or 90'):
         apply_challenge(made, 'disappear_1s')
+    made.ground_truth[110] = np.nan
+    with pytest.raises(SequenceError, match='absent in frame 110, in which'):
+        apply_challenge(made, 'cut_other_view')
 
 
-def test_absent_targets_stay_absent(name):
+def test_absent_targets_stay_absent(name, sequence):
     plain = sequence()
     plain.ground_truth[30:34] = np.nan
     made = apply_challenge(plain, name)
     absent = is_absent(made.ground_truth)
-    assert absent[30:34].all() and not absent[:30].any()
+    assert absent[30:34].all() and not absent[0]
+    assert not absent[:30].any() or name.startswith('start_on')
     made.frames[31]
 
 
@@ -334,8 +305,9 @@ def test_names_are_chosen_once_or_all():
 def test_real_sequences_take_every_challenge(thermal_dev, folder):
     from lmsco_ros.evaluation.datasets import scan_dataset
     plain = scan_dataset(thermal_dev / folder).sequences[0].first(70)
-    for which in set(CHALLENGES) - {'disappear_3s', 'leave', 'cut'}:
+    for which in set(CHALLENGES) - {'disappear_3s', 'leave', 'leave_edge', 'cut',
+                                    'cut_other_view'}:
         made = apply_challenge(plain, which)
         truth = made.ground_truth[[10]]
-        assert overlaps(truth, plain.ground_truth[[10]])[0] == 1
+        assert which.startswith('start_on') or overlaps(truth, plain.ground_truth[[10]])[0] == 1
         assert made.frames[35].shape[:2] == plain.frames[35].shape[:2]

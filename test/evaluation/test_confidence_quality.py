@@ -72,8 +72,16 @@ def test_lost_is_false_only_while_the_box_was_right():
     overlap = np.array([1, .9, .9, .9, .1, .1])
     lost = np.array([0, 1, 1, 0, 0, 1], bool)
     figures = lost_figures(lost, overlap)
-    assert figures.false_alarms == 1
+    assert (figures.false_alarms, figures.recovered) == (1, 1)
     assert figures.lost_while_present == 3
+
+
+@pytest.mark.parametrize('frames, recovered', [(29, 1), (30, 0)])
+def test_target_is_found_again_within_thirty_frames_of_a_false_alarm(frames, recovered):
+    lost = np.array([False] * 3 + [True] * frames + [False] * 5)
+    assert lost_figures(lost, np.full(len(lost), .9)).recovered == recovered
+    # A box that is not on the target is not found.
+    assert lost_figures(lost, np.r_[.9, .9, .9, np.full(len(lost) - 3, .4)]).recovered == 0
 
 
 def returning(truth, boxes, lost=(), starts=(0,)):

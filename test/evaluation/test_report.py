@@ -119,11 +119,11 @@ def test_page_holds_everything_and_refers_to_nothing_outside(parse, runs, tmp_pa
     assert 'skipped x/broken: no frames' in text
     assert 'lazy crashed on vot_tir/birds: frame 9: stumbled' in text
     assert all(reference.startswith(('data:image/', '#')) for reference in page.references)
-    # Eight plots, two thumbnails, and the strips of the tracker that never moved.
-    assert page.images == 8 + 2 + 2
+    # Nine plots, two thumbnails, and the strips of the tracker that never moved.
+    assert page.images == 9 + 2 + 2
     names = {path.stem for path in (tmp_path / 'pictures').glob('*.png')}
     assert {'success', 'precision', 'normalized_precision', 'speed', 'ar_raw', 'ar_rank',
-            'eao_curve', 'eao_order', 'failure_lazy_vot_tir_birds'} <= names
+            'reliability', 'eao_curve', 'eao_order', 'failure_lazy_vot_tir_birds'} <= names
 
 
 def test_page_of_several_starts_alone(parse, runs):
@@ -137,7 +137,7 @@ def test_page_of_several_starts_alone(parse, runs):
 @pytest.mark.parametrize('protocol', ['ope', 'vot'])
 def test_page_of_one_protocol_alone(parse, runs, protocol):
     page = parse({protocol: runs[protocol]})
-    assert page.images == 4 + 2 + 2
+    assert page.images == 4 + (protocol == 'ope') + 2 + 2
     anchors = [item for item in page.references if item.startswith('#')]
     assert ('#one-pass' in anchors) == (protocol == 'ope')
 
@@ -206,6 +206,37 @@ def test_absences_have_a_table_only_where_there_are_any(parse, runs):
     assert page.text.count('targets that left') == 1
     assert page.text.count('AUROC of the score') == 2
     assert 'leave: the picture pans away from the target and back' in page.text
+
+
+def test_covariances_have_tables_by_kind_of_scene_where_a_tracker_tells_them(parse, runs):
+    assert 'Covariance' not in parse(runs).text
+    run = runs['ope']
+    told = tuple(replace(trace, predicted=trace.boxes,
+                         covariances=np.tile(np.eye(4), (len(trace.boxes), 1, 1)))
+                 for trace in run.traces['lazy'])
+    run = replace(run, traces={**run.traces, 'lazy': told})
+    by_group = parse({'ope': run}).text
+    assert by_group.count('within the 95 % ellipse') == 2 * 3
+    assert {'vot_tir', 'drone_ir', 'all sequences'} <= set(by_group)
+    scenes = {'aerial': ['drone_ir'], 'ground-level': ['vot_tir', 'ptb_tir'], 'sea': ['none']}
+    run = replace(run, context={**run.context, 'scenes': scenes})
+    by_scene = parse({'ope': run}).text
+    assert {'aerial (drone_ir)', 'ground-level (vot_tir, ptb_tir)'} <= set(by_scene)
+    assert 'sea (none)' not in by_scene and by_scene.count('within the 95 % ellipse') == 2 * 3
+
+
+def test_starts_on_nothing_have_no_accuracy_and_are_told_apart(parse, runs):
+    infos = []
+    for info in runs['ope'].sequences:
+        truth = np.full((40, 4), np.nan)
+        truth[0] = info.ground_truth[0]
+        infos.append(SequenceInfo(info.name, info.group, info.size, truth, {},
+                                  'start_on_background'))
+    traces = {name: tuple(Trace(np.tile(info.ground_truth[0], (40, 1)), np.full(40, 0.9),
+                                np.zeros(40, bool), (0,), updates=39) for info in infos)
+              for name in TRACKERS}
+    page = parse({'ope': EvaluationRun('ope', tuple(infos), traces, {})})
+    assert 'starts on nothing' in page.text and 'nan' not in ' '.join(page.text)
 
 
 def test_pictures_show_images_with_pixels_without_a_value():

@@ -140,7 +140,10 @@ def changed(**values):
     changed(lost=[7]), changed(lost=[0.5]), changed(lost='0'), changed(starts=[-1]),
     changed(failures=None), changed(updates='3'), changed(wall_seconds=None),
     changed(cpu_seconds='fast'), changed(error=5), changed(tracker='Other'),
-    changed(sequence='data/rough'), changed(protocol='vot'),
+    changed(sequence='data/rough'), changed(protocol='vot'), changed(predicted=[None] * 4),
+    changed(covariances=[None] * 4), changed(predicted=[None] * 3, covariances=[None] * 4),
+    changed(predicted=[None] * 4, covariances=[[1] * 9] * 4),
+    changed(predicted=[None] * 4, covariances=[['1'] * 10] * 4),
 ])
 def test_damaged_records_are_made_again(tmp_path, vot_folder, scripted, damage):
     sequences = scan_dataset(vot_folder(tmp_path / 'data' / 'calm', [TRACK] * 4)).sequences
@@ -161,7 +164,9 @@ def test_damaged_records_are_made_again(tmp_path, vot_folder, scripted, damage):
 @given(cut=st.integers(0, 4000), insert=st.binary(max_size=6), remove=st.integers(0, 9))
 def test_any_damage_is_a_result_error_or_none(tmp_path_factory, cut, insert, remove):
     path = tmp_path_factory.mktemp('records') / 'record.json'
-    trace = Trace(np.full((9, 4), 1.5), np.ones(9), np.zeros(9, bool), starts=(0,), updates=8)
+    boxes = np.full((9, 4), 1.5)
+    trace = Trace(boxes, np.ones(9), np.zeros(9, bool), starts=(0,), updates=8, predicted=boxes,
+                  covariances=np.ones((9, 4, 4)))
     content = json.dumps(trace.to_json()).encode()
     path.write_bytes(content[:cut] + insert + content[cut + remove:])
     try:
@@ -170,13 +175,32 @@ def test_any_damage_is_a_result_error_or_none(tmp_path_factory, cut, insert, rem
         assert 'record.json is damaged' in str(error)
 
 
+def test_records_keep_predictions_and_covariances(tmp_path):
+    root = np.random.default_rng(3).normal(size=(5, 4, 4))
+    covariances = root @ root.transpose(0, 2, 1)
+    boxes = np.full((5, 4), 1.5)
+    predicted = boxes + 0.123
+    predicted[0] = covariances[0] = np.nan
+    trace = Trace(boxes, np.ones(5), np.zeros(5, bool), (0,), predicted=predicted,
+                  covariances=covariances)
+    again = Trace.from_json(json.loads(json.dumps(trace.to_json())))
+    np.testing.assert_allclose(again.predicted, predicted, rtol=1e-4)
+    np.testing.assert_allclose(again.covariances, covariances, rtol=1e-4)
+    silent = Trace(boxes, np.ones(5), np.zeros(5, bool), (0,)).to_json()
+    assert silent['predicted'] is None and silent['covariances'] is None
+    # Those of earlier versions have neither.
+    del silent['predicted'], silent['covariances']
+    assert Trace.from_json(silent).covariances is None
+
+
 @pytest.mark.parametrize('damage', [
     lambda text: '', lambda text: text[:200], lambda text: '{', lambda text: '[1]',
     lambda text: '{}', changed(records=[]), changed(records={'Scripted': ['no/such.json'] * 3}),
     changed(records={'Scripted': []}), changed(records={'Scripted': [1, 2, 3]}),
     changed(sequences=[]), changed(sequences=[1]), changed(protocol='vot'), changed(context=[]),
     changed(context={'machine': 5}), changed(context={'anchors': {'length': 'far'}}),
-    changed(context={'skipped': [{}]}),
+    changed(context={'skipped': [{}]}), changed(context={'scenes': ['aerial']}),
+    changed(context={'scenes': {'aerial': 'drone_ir'}}),
     lambda text: text.replace('"size": [64, 48]', '"size": [64]'),
     lambda text: text.replace('"challenge": ""', '"challenge": "of another version"'),
     lambda text: text.replace('"name": "calm"', '"name": 7'),

@@ -14,6 +14,7 @@
 
 """Figures of whole runs against hand-computed values."""
 
+from dataclasses import replace
 import math
 
 import numpy as np
@@ -22,8 +23,11 @@ import pytest
 from lmsco_ros.evaluation.run_file import EvaluationRun, SequenceInfo
 from lmsco_ros.evaluation.summaries.attributes import attribute_names, summarize_attributes
 from lmsco_ros.evaluation.summaries.confidence import confidence_parts, summarize_confidence
+from lmsco_ros.evaluation.summaries.consistency import consistency_parts, summarize_consistency
 from lmsco_ros.evaluation.summaries.differences import differences, reference_of
 from lmsco_ros.evaluation.summaries.one_pass import summarize_one_pass
+from lmsco_ros.evaluation.summaries.score import summarize_scores
+from lmsco_ros.evaluation.summaries.starts import StartSummary, summarize_starts
 from lmsco_ros.evaluation.summaries.supervised import eao_interval, summarize_supervised
 from lmsco_ros.evaluation.trace import Trace
 
@@ -121,8 +125,8 @@ def test_confidence_pools_sequences():
     run = EvaluationRun('ope', (sequence('a', 2), sequence('b', 2)), {
         'one': (trace([1, .1], scores=[.9, .3]), trace([1, 1], scores=[.8, .2], lost=[1]))})
     (summary,) = summarize_confidence(run)
-    assert summary.auroc.value == pytest.approx(2 / 3)
     assert summary.false_alarms.value == pytest.approx(1000 / 4)
+    assert summary.recovered_share.value == 0
     assert summary.lost_share.value == pytest.approx(1 / 4)
     assert summary.departures == 0 and math.isnan(summary.delay)
 
@@ -137,6 +141,7 @@ def test_absences_and_returns_pool_sequences():
     run = EvaluationRun('ope', infos, {'one': (found, elsewhere, found)})
     (summary,) = summarize_confidence(run.only(challenge='leave'))
     assert (summary.departures, summary.declared, summary.delay) == (2, 1, 3)
+    assert summary.declared_soon == 1
     assert summary.absent == 20
     assert summary.claimed_share.value == pytest.approx((3 + 10) / 20)
     assert (summary.returns, summary.found, summary.found_delay) == (2, 1, 2)
@@ -144,6 +149,79 @@ def test_absences_and_returns_pool_sequences():
     assert summary.mistaken == 1
     assert [(name, len(part.sequences)) for name, part in confidence_parts(run)] == [
         ('leave', 2), ('twin', 1)]
+
+
+def test_absence_that_is_declared_late_is_not_declared_soon():
+    truth = np.tile([10., 10, 10, 10], (50, 1))
+    truth[5:] = np.nan
+    info = SequenceInfo('a', 'group', (100, 100), truth, {})
+    run = EvaluationRun('ope', (info, info), {
+        'one': (trace([1] * 50, lost=[34]), trace([1] * 50, lost=[35]))})
+    (summary,) = summarize_confidence(run)
+    assert (summary.declared, summary.declared_soon) == (2, 1)
+
+
+def test_scores_are_pooled_and_averaged_over_sequences():
+    run = EvaluationRun('ope', (sequence('a', 4), sequence('b', 2), sequence('c', 2)), {
+        'one': (trace([1, 1, .1, .1], scores=[.9, .3, .35, .2]),
+                trace([1, .1], scores=[.8, .1]), trace([1, 1], scores=[.7, .7])),
+        'silent': (trace([1] * 4), trace([1] * 2), trace([1] * 2))})
+    one, silent = summarize_scores(run)
+    # Of the pairs of good .9 .3 .8 .7 .7 and bad .35 .2 .1 only .3 and .35 are out of order.
+    assert one.auroc.value == pytest.approx(14 / 15)
+    assert one.mean_auroc.value == pytest.approx((3 / 4 + 1) / 2)
+    # Bins of .1, .2, .3 to .4 (half good), .7, .8, .9.
+    gaps = .1 + .2 + (.65 - 1) * -1 + .6 + .2 + .1
+    assert one.calibration_error.value == pytest.approx(gaps / 8)
+    assert math.isnan(silent.auroc.value) and math.isnan(silent.calibration_error.value)
+    assert silent.calibration.frames.sum() == 0
+
+
+def test_starts_are_pooled_by_what_they_are_on():
+    there = np.tile([10., 10, 10, 10], (40, 1))
+    nothing = there.copy()
+    nothing[1:] = np.nan
+    infos = [SequenceInfo(name, 'group', (100, 100), truth, {})
+             for name, truth in (('a', there), ('b', nothing), ('c', nothing), ('d', there[:9]))]
+    low, high = [.4] * 40, [.9] * 40
+    run = EvaluationRun('ope', tuple(infos), {
+        'one': (trace([1] * 40, scores=high), trace([1] * 40, scores=low),
+                trace([1] * 40, scores=high, lost=[25]), trace([1] * 9, scores=[.1] * 9)),
+        'other': (trace([1] * 40, scores=low, lost=[8]), trace([1] * 40, scores=high),
+                  trace([1] * 40, scores=high), trace([1] * 9))})
+    assert summarize_starts(run) == (StartSummary('one', 2, 1, 1, 1, 0, 0),
+                                     StartSummary('other', 2, 0, 0, 1, 1, 1))
+
+
+def test_consistency_is_told_of_all_frames_and_of_those_that_are_followed():
+    def told(plain, offset, variance):
+        predicted = plain.boxes + [offset, 0, 0, 0]
+        return replace(plain, predicted=predicted, covariances=np.tile(
+            variance * np.eye(4), (len(predicted), 1, 1)))
+    run = EvaluationRun('ope', (sequence('a', 4), sequence('b', 4)), {
+        'silent': (trace([1] * 4), trace([1] * 4)),
+        'one': (told(trace([1] * 4), 2, 1), told(trace([1] * 4, lost=[2, 3]), 3, 9))})
+    (one,) = summarize_consistency(run)
+    assert one.tracker == 'one' and one.everywhere.frames == 8 and one.followed.frames == 6
+    assert one.everywhere.mean.value == pytest.approx((4 * 4 + 4 * 1) / 8)
+    assert one.followed.mean.value == pytest.approx((4 * 4 + 2 * 1) / 6)
+    assert one.followed.factor == pytest.approx(1.5) and one.followed.median == 4
+    assert one.everywhere.inside.value == 1
+    assert one.band == pytest.approx((0.4844 / 2, 11.143 / 2), rel=1e-3)
+    assert [title for title, _ in consistency_parts(run)] == ['group']
+
+
+def test_sequence_without_a_target_after_the_start_has_no_accuracy():
+    truth = np.tile([10., 10, 10, 10], (50, 1))
+    truth[1:] = np.nan
+    nothing = SequenceInfo('a', 'group', (100, 100), truth, {})
+    run = EvaluationRun('ope', (nothing, sequence('b', 2)), {'one': (trace([1] * 50),
+                                                                     trace([1, 1]))})
+    (summary,) = summarize_one_pass(run)
+    assert math.isnan(summary.aucs[0]) and summary.success_auc.value == pytest.approx(20 / 21)
+    assert summary.success[0] == 1 and np.isfinite(summary.precision).all()
+    (alone,) = summarize_one_pass(EvaluationRun('ope', (nothing,), {'one': (trace([1] * 50),)}))
+    assert math.isnan(alone.success_auc.value) and np.isnan(alone.success).all()
 
 
 def test_a_run_without_challenges_is_judged_as_one():

@@ -52,19 +52,21 @@ class FakeTracker:
     """
 
     def __init__(self):
-        self.states, self.error, self.calls = [], None, []
+        self.states, self.error, self.calls, self.times = [], None, [], []
         self.inspect = lambda image: None
         self.gate = threading.Event()
         self.gate.set()
 
-    def initialize(self, image, box):
+    def initialize(self, image, box, time):
         self.calls.append(('initialize', image.copy()))
+        self.times.append(time)
         self._obey(image)
         self.box = box
         return self._result(image, TrackState.TRACKING)
 
-    def update(self, image):
+    def update(self, image, time):
         self.calls.append(('update', image.copy()))
+        self.times.append(time)
         self._obey(image)
         self.box = BoundingBox(self.box.x + 1, *self.box.as_tuple()[1:])
         return self._result(image, self.states.pop(0) if self.states else TrackState.TRACKING)

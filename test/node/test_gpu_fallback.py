@@ -47,37 +47,47 @@ def calls(fake):
 
 def test_goes_on_from_the_last_frame_that_showed_the_target(bench):
     tracker, fakes, warnings = bench
-    tracker.initialize(image(0), BOX)
+    tracker.initialize(image(0), BOX, 1.0)
     fakes['cuda'].states = [TrackState.TRACKING, TrackState.LOST]
-    tracker.update(image(1))
-    tracker.update(image(2))
+    tracker.update(image(1), 2.0)
+    tracker.update(image(2), 2.0)
     fakes['cuda'].error = OutOfMemory('2 GiB are missing')
-    result = tracker.update(image(3))
+    result = tracker.update(image(3), 2.0)
     assert calls(fakes['cpu']) == [('initialize', 1), ('update', 3)]
     # The box of frame 1 is one pixel right of the first, and frame 3 moves it once more.
     assert result.box == BoundingBox(3, 2, 3, 4)
     warning, = warnings
     assert 'processor' in warning and '2 GiB are missing' in warning
-    tracker.initialize(image(4), BOX)
+    tracker.initialize(image(4), BOX, 1.0)
     assert calls(fakes['cpu'])[-1] == ('initialize', 4)
+
+
+def test_times_go_with_the_frames(bench):
+    tracker, fakes, _ = bench
+    tracker.initialize(image(0), BOX, 5.0)
+    tracker.update(image(1), 6.0)
+    fakes['cuda'].error = OutOfMemory()
+    tracker.update(image(2), 7.5)
+    assert (fakes['cuda'].times, fakes['cpu'].times) == ([5.0, 6.0, 7.5], [6.0, 7.5])
 
 
 def test_one_buffer_for_all_frames_is_as_good_as_fresh_ones(bench):
     tracker, fakes, _ = bench
     buffer = image(0)
-    tracker.initialize(buffer, BOX)
+    tracker.initialize(buffer, BOX, 1.0)
     buffer[...] = 1
-    tracker.update(buffer)
+    tracker.update(buffer, 2.0)
     fakes['cuda'].error = OutOfMemory()
     buffer[...] = 2
-    tracker.update(buffer)
+    tracker.update(buffer, 2.0)
     assert calls(fakes['cpu']) == [('initialize', 1), ('update', 2)]
 
 
 @pytest.mark.parametrize('device', ['cuda', 'cpu'])
 def test_nothing_of_a_frame_is_kept(make_fake, device):
     tracker = FallbackTracker(lambda device: make_fake(), device, lambda reason: None)
-    for call in (lambda image: tracker.initialize(image, BOX), tracker.update):
+    for call in (lambda image: tracker.initialize(image, BOX, 1.0),
+                 lambda image: tracker.update(image, 2.0)):
         frame = image(0)
         kept = weakref.ref(frame)
         call(frame)
@@ -88,7 +98,7 @@ def test_nothing_of_a_frame_is_kept(make_fake, device):
 def test_start_is_repeated_on_the_processor(bench):
     tracker, fakes, warnings = bench
     fakes['cuda'].error = OutOfMemory()
-    assert tracker.initialize(image(7), BOX).box == BOX
+    assert tracker.initialize(image(7), BOX, 1.0).box == BOX
     assert calls(fakes['cpu']) == [('initialize', 7)] and len(warnings) == 1
 
 
@@ -101,23 +111,23 @@ def test_tracker_that_does_not_fit_is_made_on_the_processor(make_fake):
             raise OutOfMemory
         return make_fake()
     tracker = FallbackTracker(make, '', warnings.append)
-    assert tracker.initialize(image(0), BOX).box == BOX
+    assert tracker.initialize(image(0), BOX, 1.0).box == BOX
     assert devices == ['', 'cpu'] and len(warnings) == 1
 
 
 def test_no_memory_anywhere_and_other_errors_are_raised(bench):
     tracker, fakes, _ = bench
-    tracker.initialize(image(0), BOX)
+    tracker.initialize(image(0), BOX, 1.0)
     fakes['cuda'].error = RuntimeError('other')
     with pytest.raises(RuntimeError, match='other'):
-        tracker.update(image(1))
+        tracker.update(image(1), 2.0)
     fakes['cuda'].error, fakes['cpu'].error = OutOfMemory(), OutOfMemory('here neither')
     with pytest.raises(OutOfMemory, match='here neither'):
-        tracker.update(image(2))
+        tracker.update(image(2), 2.0)
     fakes['cpu'].error = OutOfMemory('nor now')
     with pytest.raises(OutOfMemory, match='nor now'):
-        tracker.initialize(image(3), BOX)
-    assert tracker.initialize(image(4), BOX).box == BOX
+        tracker.initialize(image(3), BOX, 1.0)
+    assert tracker.initialize(image(4), BOX, 1.0).box == BOX
 
 
 def test_node_goes_on_and_warns_until_it_is_configured_again(run, make_fake):

@@ -51,7 +51,7 @@ STUCK_TRACKER = """
     del sys.modules['lmsco_ros.node.run']
     from lmsco_ros.node import run as real
 
-    def initialize(image, box):
+    def initialize(image, box, time):
         print('stuck', flush=True)
         while True:
             pass

@@ -57,15 +57,17 @@ class Recorder:
     """A tracker that notes its calls, and holds them while the gate is closed."""
 
     def __init__(self):
-        self.calls, self.error = [], None
+        self.calls, self.times, self.error = [], [], None
         self.gate = threading.Event()
         self.gate.set()
         self.entered = threading.Event()
 
-    def initialize(self, image, box):
+    def initialize(self, image, box, time):
+        self.times.append(time)
         return self._answer('initialize', image, box)
 
-    def update(self, image):
+    def update(self, image, time):
+        self.times.append(time)
         return self._answer('update', image, BOX)
 
     def _answer(self, call, image, box):
@@ -575,6 +577,15 @@ def test_time_with_one_frame_is_told(bench):
     b.wait(1)
     b.worker.stop(PATIENCE)
     assert b.worker.busy_seconds == 0
+
+
+def test_tracker_is_told_when_frames_were_taken(bench):
+    b = bench()
+    b.frames([1])
+    b.worker.initialize(BOX)
+    b.frames([2])
+    b.frames([3])
+    assert b.tracker.times == pytest.approx([1.0, 2.0, 3.0])
 
 
 def test_refused_request_keeps_the_target(bench):

@@ -28,10 +28,11 @@ PACKAGES = (
     ('visualization', 'msg_adapters'), ('synthetic', 'media'), ('core',),
     ('extras',))
 CORE = (
-    ('tracker',), ('track',), ('search',), ('presence',), ('detection',), ('extent', 'features'),
+    ('tracker',), ('track',), ('search',), ('presence',), ('detection',),
+    ('extent', 'features', 'state'),
     ('weights', 'learning'), ('imaging', 'fourier'), ('config', 'networks', 'backend', 'types'),
     ('errors',))
-MOST_ROOMS = 16
+MOST_ROOMS = 17
 # ROS, and what needs it.
 ABOVE_THE_CORE = ('rclpy', '_msgs', '_interfaces', 'std_srvs', 'msg_adapters')
 

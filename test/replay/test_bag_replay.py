@@ -38,10 +38,10 @@ BOX, STATUS = '/lmsco_tracker/box', '/lmsco_tracker/status'
 class Follower:
     """Says the value of the image as x; fails at an image with the value 99."""
 
-    def initialize(self, image, box):
-        return self.update(image)
+    def initialize(self, image, box, time):
+        return self.update(image, time)
 
-    def update(self, image):
+    def update(self, image, time):
         if image[0, 0] == 99:
             raise RuntimeError('the tracker fails')
         box = BoundingBox(float(image[0, 0]), 1, 2, 2)

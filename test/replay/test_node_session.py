@@ -41,12 +41,12 @@ class Follower:
         self.seen = []
         self.gate = gate
 
-    def initialize(self, image, box):
+    def initialize(self, image, box, time):
         if box.x > 60:
             raise BoxError('the box is outside of the image')
         return self._result(image, box)
 
-    def update(self, image):
+    def update(self, image, time):
         if self.gate is not None:
             self.gate.wait(100)
         state = TrackState.LOST if image[0, 0] == 255 else TrackState.TRACKING

@@ -25,7 +25,7 @@ import numpy as np
 from lmsco_ros.core.backend import Array, to_numpy
 from lmsco_ros.core.fourier.series import bandwidth, grid_size, half_weights, synthesize
 
-__all__ = ['Peak', 'centered_map', 'locate', 'peak_to_sidelobe_ratio', 'refine']
+__all__ = ['Peak', 'centered_map', 'curvature', 'locate', 'peak_to_sidelobe_ratio', 'refine']
 
 # In periods; the next step of Newton's method would be about the square of it.
 _SMALLEST_STEP = 1e-7
@@ -120,6 +120,24 @@ def refine(series: np.ndarray, start: tuple[float, float],
             break
     value = derivatives[0, 0]
     return (position, float(value)) if value >= first else (start, float(first))
+
+
+def curvature(series: np.ndarray, position: tuple[float, float]) -> np.ndarray:
+    """
+    Return the second derivatives of a series, [[yy, yx], [yx, xx]] per period squared.
+
+    Parameters
+    ----------
+    series : ndarray, shape (2K + 1, K + 1)
+        Score function.
+    position : tuple of float
+        (ty, tx) in periods.
+
+    """
+    weighted = series.astype(np.complex128) * half_weights(series)
+    derivatives = _derivatives(weighted, position)
+    return np.array([[derivatives[2, 0], derivatives[1, 1]],
+                     [derivatives[1, 1], derivatives[0, 2]]])
 
 
 def _ascent(derivatives: np.ndarray) -> tuple[float, float]:

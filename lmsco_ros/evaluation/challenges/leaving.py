@@ -28,13 +28,40 @@ from lmsco_ros.evaluation.datasets import TrackingSequence
 from lmsco_ros.evaluation.errors import SequenceError
 from lmsco_ros.evaluation.geometry import Array, clip_boxes, is_absent
 
-_AWAY = FRAMES_PER_SECOND
-_PAN = 20
 _LARGEST_WINDOW = 0.6
 _SMALLEST_SIDE = 48
 _TARGETS_WIDE = 3
 _FOLLOWED_FRAMES = 31
 _VISIBLE_SHARE = 0.25
+_GAP = 0.5
+
+
+@dataclass(frozen=True)
+class _Pan:
+    """
+    How the window turns away from the target.
+
+    Attributes
+    ----------
+    label : str
+        Name of the challenge.
+    frames : int
+        Frames that it takes to turn away, and as many to come back.
+    away : int
+        Frames between the two.
+    to_the_end : bool
+        Whether it goes as far as the image allows, or until the target is just outside.
+
+    """
+
+    label: str
+    frames: int
+    away: int
+    to_the_end: bool
+
+
+_LEAVE = _Pan('leave', 20, FRAMES_PER_SECOND, to_the_end=True)
+_LEAVE_EDGE = _Pan('leave_edge', 30, 3 * FRAMES_PER_SECOND // 2, to_the_end=False)
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,27 +84,44 @@ def leave(sequence: TrackingSequence) -> TrackingSequence:
     20 frames and back as fast. The true box is absent where less than a quarter of it is in
     the window. A target too large to be left behind makes no challenge.
     """
-    start = (len(sequence) - _AWAY) // 2
-    if start < LEAD + _PAN:
+    return _panned(sequence, _LEAVE)
+
+
+def leave_edge(sequence: TrackingSequence) -> TrackingSequence:
+    """
+    Let the target leave slowly over the edge of the picture, stay behind it, and come back.
+
+    A window as in :func:`leave` pans within 30 frames until the target is half its size
+    outside, follows it there for one second and a half, and pans back as slowly.
+    """
+    return _panned(sequence, _LEAVE_EDGE)
+
+
+def _panned(sequence: TrackingSequence, pan: _Pan) -> TrackingSequence:
+    """Return the part of each image that a window shows which turns away from the target."""
+    start = (len(sequence) - pan.away) // 2
+    if start < LEAD + pan.frames:
         raise SequenceError(f'{len(sequence)} frames; this challenge needs at least '
-                            f'{_AWAY + 2 * (LEAD + _PAN)}')
+                            f'{pan.away + 2 * (LEAD + pan.frames)}')
     shape = sequence.frames[0].shape
     image = np.array([shape[1], shape[0]])
     known = _filled(sequence.ground_truth)
-    axis, far, share = _way_out(known[start:start + _AWAY], image)
+    axis, far, share = _way_out(known[start:start + pan.away], image)
     size = np.floor(image * share).astype(int)
     if (size < np.maximum(_TARGETS_WIDE * known[0, 2:], _SMALLEST_SIDE)).any():
         raise SequenceError('the target is too large, or too much in the middle, for a part of '
                             'the image that it can leave')
     room = image - size
     follow = np.clip(_smooth(known[:, :2] + known[:, 2:] / 2) - size / 2, 0, room)
-    turned = _turned_away(len(sequence), start)[:, None]
+    turned = _turned_away(len(sequence), start, pan)[:, None]
     away = follow.copy()
     away[:, axis] = room[axis] if far else 0
+    if not pan.to_the_end:
+        away[:, axis] = np.clip(_beyond(known, size, far)[:, axis], 0, room[axis])
     corners = np.rint((1 - turned) * follow + turned * away).astype(int)
     truth = _seen(sequence.ground_truth - np.pad(corners, ((0, 0), (0, 2))), size)
     frames = ChangedFrames(sequence, range(len(sequence)),
-                           _Window(corners, (int(size[0]), int(size[1]))), 'leave')
+                           _Window(corners, (int(size[0]), int(size[1]))), pan.label)
     return replace(sequence, frames=frames, ground_truth=truth)
 
 
@@ -101,10 +145,17 @@ def _way_out(boxes: Array, image: npt.NDArray[np.int_]) -> tuple[int, bool, floa
     return best % 2, best >= 2, float(np.clip(rooms[best], 0, _LARGEST_WINDOW))
 
 
-def _turned_away(count: int, start: int) -> Array:
+def _beyond(boxes: Array, size: npt.NDArray[np.int_], far: bool) -> Array:
+    """Return the corners of windows that end half a target before it, or begin behind it."""
+    gap = _GAP * boxes[:, 2:]
+    return _smooth(boxes[:, :2] + boxes[:, 2:] + gap if far else boxes[:, :2] - gap - size)
+
+
+def _turned_away(count: int, start: int, pan: _Pan) -> Array:
     """Return how far the camera has turned away in each frame, from 0 to 1 smoothly."""
     frames = np.arange(count)
-    ramp = np.minimum(frames - (start - _PAN), start + _AWAY + _PAN - 1 - frames) / _PAN
+    ramp = np.minimum(frames - (start - pan.frames),
+                      start + pan.away + pan.frames - 1 - frames) / pan.frames
     ramp = np.clip(ramp, 0, 1)
     return ramp**2 * (3 - 2 * ramp)
 

@@ -33,6 +33,7 @@ LEAD = 20
 
 _TWIN_NEAR, _TWIN_FAR = 1.6, 3.0
 _TWIN_PERIODS = 97, 61
+_CROSSING_SPEED = 0.15
 
 
 @dataclass(frozen=True, eq=False)
@@ -123,6 +124,22 @@ def twin(sequence: TrackingSequence) -> TrackingSequence:
     offsets = distance[:, None] * np.stack([side * np.cos(angle), np.sin(angle)], axis=1)
     return replace(sequence, frames=ChangedFrames(
         sequence, frames.tolist(), _Twin(sequence.ground_truth, offsets), 'twin'))
+
+
+def twin_crosses(sequence: TrackingSequence) -> TrackingSequence:
+    """
+    Let a copy of the target cross it in the middle of the sequence, on a course of its own.
+
+    It comes from afar, on a line that is drawn by chance, by 0.15 sizes a frame faster than the
+    target, covers it when it is there, and goes on. The true box stays that of the first one.
+    """
+    angle = generator(seed_of(sequence)).uniform(0, 2 * np.pi)
+    size = np.nanmedian(np.sqrt(np.prod(sequence.ground_truth[:, 2:], axis=1)))
+    frames = np.arange(len(sequence))
+    way = _CROSSING_SPEED * size * (frames - len(sequence) // 2)
+    offsets = way[:, None] * np.array([np.cos(angle), np.sin(angle)])
+    return replace(sequence, frames=ChangedFrames(
+        sequence, frames.tolist(), _Twin(sequence.ground_truth, offsets), 'twin_crosses'))
 
 
 def _middle(sequence: TrackingSequence, duration: int) -> int:

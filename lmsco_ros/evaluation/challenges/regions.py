@@ -53,7 +53,7 @@ def without_region(image: npt.NDArray, box: Box, rng: np.random.Generator) -> np
     if not mask.any() or mask.all():
         return image
     filled = cv2.inpaint(part, mask, _INPAINT_RADIUS, cv2.INPAINT_TELEA).astype(np.float32)
-    filled += rng.normal(0, _noise(part, mask), filled.shape)
+    filled += rng.normal(0, noise_deviation(part, mask == 0), filled.shape)
     result = image.copy()
     result[outer][mask > 0] = stored(filled, image.dtype)[mask > 0]
     return result
@@ -83,10 +83,10 @@ def with_copy(image: npt.NDArray, box: Box, offset: npt.NDArray[np.float64]) -> 
     return stored(values + alpha * (patch - values), image.dtype)
 
 
-def _noise(part: npt.NDArray, mask: npt.NDArray[np.uint8]) -> float:
-    """Return the deviation of the noise outside of the mask."""
-    values = part.astype(np.float32)
-    rest = (values - cv2.GaussianBlur(values, (0, 0), 1))[mask == 0]
+def noise_deviation(image: npt.NDArray, where: npt.NDArray[np.bool_]) -> float:
+    """Return the deviation of the noise in the pixels of an image that are chosen by `where`."""
+    values = image.astype(np.float32)
+    rest = (values - cv2.GaussianBlur(values, (0, 0), 1))[where]
     return float(_DEVIATION * np.median(np.abs(rest)))
 
 

@@ -21,10 +21,13 @@ from dataclasses import dataclass, replace
 from functools import partial
 
 from lmsco_ros.evaluation.challenges.burnt_in_text import text
-from lmsco_ros.evaluation.challenges.leaving import leave
-from lmsco_ros.evaluation.challenges.presence import cut, disappear, twin
+from lmsco_ros.evaluation.challenges.leaving import leave, leave_edge
+from lmsco_ros.evaluation.challenges.other_view import cut_other_view
+from lmsco_ros.evaluation.challenges.presence import cut, disappear, twin, twin_crosses
 from lmsco_ros.evaluation.challenges.sensor import (
     dead_pixels, gain_jump, no_value, polarity, shutter, sixteen_bit, telemetry)
+from lmsco_ros.evaluation.challenges.starts import start_on_background, start_on_noise
+from lmsco_ros.evaluation.challenges.steps import contrast_step, noise_step, stretch_step
 from lmsco_ros.evaluation.datasets import TrackingSequence
 from lmsco_ros.evaluation.errors import RequestError
 
@@ -53,12 +56,23 @@ CHALLENGES: Mapping[str, Challenge] = {
     'disappear_3s': Challenge('the target is replaced by background for 90 frames',
                               partial(disappear, seconds=3)),
     'leave': Challenge('the picture pans away from the target and back', leave),
+    'leave_edge': Challenge('the target leaves slowly over the edge, stays there, and is back',
+                            leave_edge),
     'cut': Challenge('frames are missing, so that the target jumps', cut),
+    'cut_other_view': Challenge('after a cut another view is shown, in which the target comes '
+                                'up two seconds later', cut_other_view),
     'twin': Challenge('a copy of the target moves beside it', twin),
+    'twin_crosses': Challenge('a copy of the target crosses it on another course',
+                              twin_crosses),
     'twin_remains': Challenge('beside a copy of itself, the target disappears for 30 frames',
                               lambda sequence: disappear(twin(sequence), 1)),
     'shutter': Challenge('the picture stands for 12 frames every 60', shutter),
     'gain_jump': Challenge('gain and offset jump every 20 frames', gain_jump),
+    'noise_step': Challenge('from a third on, the noise is six times as strong', noise_step),
+    'contrast_step': Challenge('for a third of the time, the contrast is 0.3 of what it was',
+                               contrast_step),
+    'stretch_step': Challenge('from a third on, contrast 0.3 and six times the noise at once',
+                              stretch_step),
     'polarity': Challenge('white hot and black hot change places for a third of the time',
                           polarity),
     'dead_pixels': Challenge('dead pixels, rows and columns', dead_pixels),
@@ -66,6 +80,10 @@ CHALLENGES: Mapping[str, Challenge] = {
     'nan': Challenge('float images with spots of NaN and infinity', no_value),
     'text': Challenge('a clock, a reticle and a blinking word are drawn into the picture', text),
     'sixteen_bit': Challenge('510 of 65,536 counts, with drift', sixteen_bit),
+    'start_on_background': Challenge('the tracker is started where nothing stands out',
+                                     start_on_background),
+    'start_on_noise': Challenge('the tracker is started on noise that is new in each frame',
+                                start_on_noise),
 }
 
 

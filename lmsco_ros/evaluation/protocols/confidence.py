@@ -46,6 +46,9 @@ class LostFigures:
     false_alarms : int
         Times LOST was declared while the target was there and the box, one frame
         before, overlapped it by more than `GOOD_OVERLAP`.
+    recovered : int
+        Of these, after which a box, not LOST, overlapped the target by as much within
+        `RETURN_FRAMES`.
     frames_present : int
         Frames with the target in the image.
     lost_while_present : int
@@ -55,6 +58,7 @@ class LostFigures:
 
     delays: tuple[int | None, ...]
     false_alarms: int
+    recovered: int
     frames_present: int
     lost_while_present: int
 
@@ -121,6 +125,19 @@ def auroc_terms(scores: Sequence[Array], overlap: Sequence[Array]) -> tuple[Arra
         [float(len(part)) for part in bad])
 
 
+def mean_auroc(ordered: Array, good: Array, bad: Array, weights: Array) -> Array:
+    """
+    Return the mean of the AUROC of each sequence, of those with both good and bad frames.
+
+    Parameters and shapes are those of :func:`auroc`, which pools the frames of all sequences.
+    """
+    pairs = good * bad
+    own = np.divide(np.diag(ordered), pairs, out=np.zeros(len(good)), where=pairs > 0)
+    counted = weights @ (pairs > 0).astype(float)
+    return np.divide(weights @ own, counted, out=np.full(np.shape(counted), np.nan),
+                     where=counted > 0)
+
+
 def auroc(ordered: Array, good: Array, bad: Array, weights: Array) -> Array:
     """
     Return the chance that a good frame is scored above a bad one.
@@ -160,9 +177,11 @@ def lost_figures(lost: Flags, overlap: Array) -> LostFigures:
     onsets = np.flatnonzero(lost[1:] & ~lost[:-1]) + 1
     false = [frame for frame in onsets
              if not absent[frame] and overlap[frame - 1] > GOOD_OVERLAP]
+    found = ~lost & (overlap > GOOD_OVERLAP)
     return LostFigures(
         delays=tuple(_delay(lost[start:end]) for start, end in _absences(absent)),
         false_alarms=len(false),
+        recovered=sum(bool(found[frame:frame + RETURN_FRAMES].any()) for frame in false),
         frames_present=int((~absent).sum()),
         lost_while_present=int((lost & ~absent).sum()))
 

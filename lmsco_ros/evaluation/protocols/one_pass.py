@@ -75,11 +75,15 @@ def one_pass_figures(ground_truth: Array, boxes: Array) -> OnePassFigures:
     Parameters
     ----------
     ground_truth, boxes : ndarray, shape (n, 4)
-        True boxes (NaN: target absent, not counted) and answers (NaN: none, a miss).
+        True boxes (NaN: target absent, not counted) and answers (NaN: none, a miss). With a
+        target in no frame but the one of the start, all figures are NaN.
 
     """
     overlap = overlaps(ground_truth, boxes)
     counted = np.isfinite(overlap)
+    if counted.sum() < 2 <= len(counted):
+        return OnePassFigures(*(np.full(len(thresholds), np.nan) for thresholds in (
+            SUCCESS_THRESHOLDS, PRECISION_THRESHOLDS, NORMALIZED_THRESHOLDS)))
     offsets = center_offsets(ground_truth, boxes)[counted]
     errors = np.linalg.norm(offsets, axis=1)
     relative = np.linalg.norm(offsets / ground_truth[counted, 2:], axis=1)

@@ -31,6 +31,7 @@ import numpy as np
 from lmsco_ros.evaluation.challenges import CHALLENGES
 from lmsco_ros.evaluation.datasets import TrackingSequence
 from lmsco_ros.evaluation.execution import PROTOCOLS
+from lmsco_ros.evaluation.protocols.bootstrap import mean_estimate
 from lmsco_ros.evaluation.record_store import file_name
 from lmsco_ros.evaluation.report.conditions import conditions, extent, problems
 from lmsco_ros.evaluation.report.failures import worst_failures
@@ -38,17 +39,22 @@ from lmsco_ros.evaluation.report.formatting import number, spread_warning
 from lmsco_ros.evaluation.report.one_pass_plots import one_pass_plots
 from lmsco_ros.evaluation.report.pictures import (
     encode, failure_strip, thumbnail, TRUTH_COLOR)
+from lmsco_ros.evaluation.report.score_plots import score_plots
 from lmsco_ros.evaluation.report.style import looks
 from lmsco_ros.evaluation.report.supervised_plots import expected_overlap_plot, supervised_plots
 from lmsco_ros.evaluation.report.tables import (
-    absence_table, anchor_table, border_table, Cell, confidence_table, difference_rows,
-    one_pass_table, Row, supervised_table, Table)
+    absence_table, anchor_table, border_table, Cell, confidence_table, consistency_table,
+    difference_rows, one_pass_table, reliability_table, Row, score_table, start_table,
+    supervised_table, Table)
 from lmsco_ros.evaluation.run_file import EvaluationRun
 from lmsco_ros.evaluation.summaries.anchors import anchor_interval, summarize_anchors
 from lmsco_ros.evaluation.summaries.attributes import attribute_names, summarize_attributes
 from lmsco_ros.evaluation.summaries.confidence import confidence_parts, summarize_confidence
+from lmsco_ros.evaluation.summaries.consistency import consistency_parts, summarize_consistency
 from lmsco_ros.evaluation.summaries.differences import differences
 from lmsco_ros.evaluation.summaries.one_pass import summarize_one_pass
+from lmsco_ros.evaluation.summaries.score import summarize_scores
+from lmsco_ros.evaluation.summaries.starts import summarize_starts
 from lmsco_ros.evaluation.summaries.supervised import eao_interval, summarize_supervised
 from lmsco_ros.evaluation.whole_file import write_whole
 
@@ -117,7 +123,7 @@ def _subtitle(run: EvaluationRun, trackers: Iterable[str]) -> str:
 
 
 def _one_pass(run: EvaluationRun, folder: Path) -> dict[str, Any]:
-    summaries = summarize_one_pass(run)
+    summaries, scores = summarize_one_pass(run), summarize_scores(run)
     aucs = {item.tracker: item.aucs for item in summaries}
     return {
         'table': one_pass_table(summaries),
@@ -126,21 +132,32 @@ def _one_pass(run: EvaluationRun, folder: Path) -> dict[str, Any]:
         'attributes': _attributes(run, 'frames'),
         'challenges': _challenges(run, {item.tracker: item.aucs for item in summaries}),
         'confidence': [_confidence(part, name) for name, part in confidence_parts(run)],
+        'reliability': reliability_table(scores),
+        'reliability_plots': _save_plots(score_plots(scores), folder),
+        'consistency': _consistency(run),
     }
 
 
 def _confidence(run: EvaluationRun, challenge: str) -> dict[str, Any]:
     summaries = summarize_confidence(run)
     title = f'{challenge}: {CHALLENGES[challenge].description}' if challenge else ''
-    return {'title': title, 'table': confidence_table(summaries),
-            'absence': absence_table(summaries)}
+    tables = (score_table(summarize_scores(run)), confidence_table(summaries),
+              absence_table(summaries), start_table(summarize_starts(run)))
+    return {'title': title, 'tables': [table for table in tables if table is not None]}
+
+
+def _consistency(run: EvaluationRun) -> list[dict[str, Any]]:
+    """Return the tables of covariances by kind of scene; none where no tracker tells any."""
+    parts = [(title, summarize_consistency(part)) for title, part in consistency_parts(run)]
+    return [{'title': title, 'band': ' – '.join(number(end, 2) for end in summaries[0].band),
+             'table': consistency_table(summaries)} for title, summaries in parts if summaries]
 
 
 def _challenges(run: EvaluationRun, aucs: Mapping[str, Any]) -> Table | None:
     """Return the mean success AUC under each challenge, with the number of sequences."""
     marks = np.array([sequence.challenge for sequence in run.sequences])
     rows = tuple(
-        Row(name, tuple(Cell(number(float(values[marks == challenge].mean())),
+        Row(name, tuple(Cell(number(mean_estimate(values[marks == challenge]).value),
                              str((marks == challenge).sum()))
                         for challenge in run.challenges))
         for name, values in aucs.items())

@@ -22,14 +22,19 @@ import math
 from typing import Generic, TypeVar
 
 from lmsco_ros.evaluation.protocols.bootstrap import Estimate
+from lmsco_ros.evaluation.protocols.calibration import BINS
 from lmsco_ros.evaluation.report.formatting import interval, number, signed
 from lmsco_ros.evaluation.summaries.anchors import AnchorSummary, StartFigures
 from lmsco_ros.evaluation.summaries.confidence import ConfidenceSummary
+from lmsco_ros.evaluation.summaries.consistency import ConsistencySummary, ErrorFigures
 from lmsco_ros.evaluation.summaries.differences import Difference
 from lmsco_ros.evaluation.summaries.one_pass import OnePassSummary
+from lmsco_ros.evaluation.summaries.score import ScoreSummary
+from lmsco_ros.evaluation.summaries.starts import StartSummary
 from lmsco_ros.evaluation.summaries.supervised import SupervisedSummary
 
-Summary = TypeVar('Summary', OnePassSummary, SupervisedSummary, AnchorSummary, ConfidenceSummary)
+Summary = TypeVar('Summary', OnePassSummary, SupervisedSummary, AnchorSummary, ConfidenceSummary,
+                  ScoreSummary, StartSummary, ConsistencySummary)
 
 
 @dataclass(frozen=True)
@@ -167,11 +172,62 @@ def anchor_overview(summaries: Sequence[AnchorSummary]) -> Table:
     return _table(columns, summaries, None)
 
 
-def confidence_table(summaries: Sequence[ConfidenceSummary]) -> Table:
-    """Return the table of scores and of LOST while the target is there."""
-    columns: tuple[_Column[ConfidenceSummary], ...] = (
+def score_table(summaries: Sequence[ScoreSummary]) -> Table:
+    """Return the table of scores."""
+    columns: tuple[_Column[ScoreSummary], ...] = (
         _Column('AUROC of the score', lambda item: item.auroc),
+        _Column('AUROC, mean of sequences', lambda item: item.mean_auroc),
+        _Column('calibration error', lambda item: item.calibration_error, 3, -1))
+    return _table(columns, summaries, None)
+
+
+def reliability_table(summaries: Sequence[ScoreSummary]) -> Table | None:
+    """Return the share of good frames by their score; None where no score is a probability."""
+    rows = [Row(item.tracker, tuple(
+        Cell(number(share), f'{number(score)}, {count:.0f}' if count else '')
+        for share, score, count in zip(item.calibration.shares, item.calibration.mean_scores,
+                                       item.calibration.frames)))
+            for item in summaries if item.calibration.frames.any()]
+    titles = tuple(f'{number(index / BINS, 1)} – {number((index + 1) / BINS, 1)}'
+                   for index in range(BINS))
+    return Table(titles, tuple(rows)) if rows else None
+
+
+def start_table(summaries: Sequence[StartSummary]) -> Table | None:
+    """Return the table of what was said soon after starts, None where none can be judged."""
+    if not any(item.on_nothing or item.on_target for item in summaries):
+        return None
+    columns: tuple[_Column[StartSummary], ...] = (
+        _Column('starts on nothing', lambda item: _plain(item.on_nothing), 0, 0),
+        _Column('told within 30 frames', lambda item: _plain(item.told), 0),
+        _Column('LOST', lambda item: _plain(item.lost), 0),
+        _Column('starts on a target', lambda item: _plain(item.on_target), 0, 0),
+        _Column('falsely told', lambda item: _plain(item.falsely_told), 0, -1),
+        _Column('falsely LOST', lambda item: _plain(item.falsely_lost), 0, -1))
+    return _table(columns, summaries, None)
+
+
+def consistency_table(summaries: Sequence[ConsistencySummary]) -> Table | None:
+    """Return the table of covariances, None where no tracker tells any."""
+    columns = (*_error_columns('', lambda item: item.everywhere),
+               *_error_columns('followed: ', lambda item: item.followed))
+    return _table(columns, summaries, None) if summaries else None
+
+
+def _error_columns(title: str, group: Callable[[ConsistencySummary], ErrorFigures],
+                   ) -> tuple[_Column[ConsistencySummary], ...]:
+    return (_Column(f'{title}frames', lambda item: _plain(group(item).frames), 0, 0),
+            _Column('mean error²', lambda item: group(item).mean, 2, 0),
+            _Column('factor', lambda item: _plain(group(item).factor), 2, 0),
+            _Column('median', lambda item: _plain(group(item).median), 2, 0),
+            _Column('within the 95 % ellipse', lambda item: group(item).inside, 3, 0))
+
+
+def confidence_table(summaries: Sequence[ConfidenceSummary]) -> Table:
+    """Return the table of LOST while the target is there."""
+    columns: tuple[_Column[ConfidenceSummary], ...] = (
         _Column('false LOST per 1000 frames', lambda item: item.false_alarms, 2, -1),
+        _Column('found again within 30 frames', lambda item: item.recovered_share),
         _Column('share of frames LOST', lambda item: item.lost_share, 3, 0))
     return _table(columns, summaries, None)
 
@@ -183,6 +239,7 @@ def absence_table(summaries: Sequence[ConfidenceSummary]) -> Table | None:
     columns: tuple[_Column[ConfidenceSummary], ...] = (
         _Column('targets that left', lambda item: _plain(item.departures), 0, 0),
         _Column('LOST declared', lambda item: _plain(item.declared), 0),
+        _Column('within 30 frames', lambda item: _plain(item.declared_soon), 0),
         _Column('median frames to LOST', lambda item: _plain(item.delay), 0, -1),
         _Column('share of absent frames claimed', lambda item: item.claimed_share, 3, -1),
         _Column('returns', lambda item: _plain(item.returns), 0, 0),

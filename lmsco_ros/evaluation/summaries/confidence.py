@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""How far each tracker's score and LOST can be trusted, over a one-pass run."""
+"""How far each tracker's LOST and its claims can be trusted, over a one-pass run."""
 
 from __future__ import annotations
 
@@ -21,9 +21,9 @@ from statistics import median
 
 import numpy as np
 
-from lmsco_ros.evaluation.protocols.bootstrap import Estimate, estimate, ratio_estimate
+from lmsco_ros.evaluation.protocols.bootstrap import Estimate, ratio_estimate
 from lmsco_ros.evaluation.protocols.confidence import (
-    auroc, auroc_terms, lost_figures, return_figures)
+    lost_figures, return_figures, RETURN_FRAMES)
 from lmsco_ros.evaluation.run_file import EvaluationRun
 
 
@@ -36,14 +36,15 @@ class ConfidenceSummary:
     ----------
     tracker : str
         Name.
-    auroc : Estimate
-        Chance that a frame with overlap above 0.5 has the higher score; NaN without scores.
-    departures, declared : int
-        Times a target left, and how often LOST followed before it came back.
+    departures, declared, declared_soon : int
+        Times a target left, how often LOST followed before it came back, and how often within
+        30 frames.
     delay : float
         Median number of frames from leaving to LOST where it was declared, else NaN.
     false_alarms : Estimate
         False declarations of LOST per 1000 frames with a target.
+    recovered_share : Estimate
+        Share of these after which the target was found again within 30 frames.
     lost_share : Estimate
         Share of the frames with a target that were spent in LOST, justified or not.
     absent : int
@@ -62,11 +63,12 @@ class ConfidenceSummary:
     """
 
     tracker: str
-    auroc: Estimate
     departures: int
     declared: int
+    declared_soon: int
     delay: float
     false_alarms: Estimate
+    recovered_share: Estimate
     lost_share: Estimate
     absent: int
     claimed_share: Estimate
@@ -91,7 +93,6 @@ def _summarize(run: EvaluationRun, name: str) -> ConfidenceSummary:
     traces = run.traces[name]
     overlaps = [sequence.overlaps(trace, in_image=False)
                 for sequence, trace in zip(run.sequences, traces)]
-    terms = auroc_terms([trace.scores for trace in traces], overlaps)
     lost = [lost_figures(trace.lost, overlap) for trace, overlap in zip(traces, overlaps)]
     delays = [delay for figures in lost for delay in figures.delays]
     declared = [delay for delay in delays if delay is not None]
@@ -99,14 +100,16 @@ def _summarize(run: EvaluationRun, name: str) -> ConfidenceSummary:
             for sequence, trace, overlap in zip(run.sequences, traces, overlaps)]
     found = [[delay for delay in figures.delays if delay is not None] for figures in back]
     all_found = [delay for delays in found for delay in delays]
+    false_alarms = np.array([float(figures.false_alarms) for figures in lost])
     present = np.array([figures.frames_present / 1000 for figures in lost])
     return ConfidenceSummary(
         tracker=name,
-        auroc=estimate(lambda weights: auroc(*terms, weights), len(traces)),
         departures=len(delays), declared=len(declared),
+        declared_soon=sum(delay < RETURN_FRAMES for delay in declared),
         delay=median(declared) if declared else float('nan'),
-        false_alarms=ratio_estimate(
-            np.array([float(figures.false_alarms) for figures in lost]), present),
+        false_alarms=ratio_estimate(false_alarms, present),
+        recovered_share=ratio_estimate(
+            np.array([float(figures.recovered) for figures in lost]), false_alarms),
         lost_share=ratio_estimate(
             np.array([figures.lost_while_present / 1000 for figures in lost]), present),
         absent=sum(figures.absent for figures in back),

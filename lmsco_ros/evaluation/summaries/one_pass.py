@@ -75,9 +75,9 @@ def _summarize(run: EvaluationRun, name: str) -> OnePassSummary:
     updates = np.array([float(trace.updates) for trace in traces])
     return OnePassSummary(
         tracker=name, aucs=aucs,
-        success=np.mean([item.success for item in figures], axis=0),
-        precision=np.mean([item.precision for item in figures], axis=0),
-        normalized=np.mean([item.normalized_precision for item in figures], axis=0),
+        success=_mean([item.success for item in figures]),
+        precision=_mean([item.precision for item in figures]),
+        normalized=_mean([item.normalized_precision for item in figures]),
         success_auc=mean_estimate(aucs),
         precision_5=mean_estimate(np.array([item.precision_at(5) for item in figures])),
         precision_20=mean_estimate(np.array([item.precision_at(20) for item in figures])),
@@ -86,3 +86,9 @@ def _summarize(run: EvaluationRun, name: str) -> OnePassSummary:
         cpu_rate=ratio_estimate(updates, np.array([trace.cpu_seconds for trace in traces])),
         wall_rate=ratio_estimate(updates, np.array([trace.wall_seconds for trace in traces])),
         crashes=run.crashes(name))
+
+
+def _mean(curves: list[Array]) -> Array:
+    """Return the mean of the curves that are known; NaN where none is."""
+    known = [curve for curve in curves if np.isfinite(curve).all()]
+    return np.mean(known or curves, axis=0)

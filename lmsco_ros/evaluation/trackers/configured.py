@@ -53,7 +53,8 @@ class ConfiguredTracker:
     def update(self, image: npt.NDArray) -> Answer:
         """Track into `image`."""
         result = self._tracker.update(image)
-        return Answer(result.box, result.score, result.state)
+        return Answer(result.box, result.score, result.state, result.predicted_box,
+                      result.covariance)
 
     def close(self) -> None:
         """Release nothing; all memory is Python's."""

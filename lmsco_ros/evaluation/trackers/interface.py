@@ -35,12 +35,18 @@ class Answer(NamedTuple):
         Trust in the box, higher is better; None for trackers without a score.
     state : TrackState
         What the tracker believes.
+    predicted_box : BoundingBox or None
+        Where it takes the target to be, also while that is lost; None for trackers without it.
+    covariance : ndarray, shape (4, 4), or None
+        Of center x, center y, width and height of `predicted_box`, in px^2.
 
     """
 
     box: BoundingBox | None
     score: float | None
     state: TrackState
+    predicted_box: BoundingBox | None = None
+    covariance: npt.NDArray | None = None
 
 
 class EvaluatedTracker(Protocol):

@@ -19,7 +19,7 @@ import numpy as np
 import pytest
 
 from lmsco_ros.core.fourier.localization import (
-    centered_map, locate, peak_to_sidelobe_ratio, refine)
+    centered_map, curvature, locate, peak_to_sidelobe_ratio, refine)
 from lmsco_ros.core.fourier.series import analyze, synthesize
 
 
@@ -100,6 +100,20 @@ def test_newton_never_ends_below_its_start(seed, y, x):
     series = analyze(np.random.default_rng(seed).normal(size=(7, 7)))
     start_value = refine(series, (y, x), 0)[1]
     assert refine(series, (y, x), 6)[1] >= start_value
+
+
+@pytest.mark.parametrize('y, x', [(0, 0), (0.3, 0.8), (0.51, 0.07)])
+def test_curvature_is_that_of_differences(evaluate, rng, y, x):
+    series = analyze(rng.normal(size=(7, 7)))
+    h = 1e-4
+
+    def at(i, j):
+        return evaluate(series, y + i * h, x + j * h)
+    yy = at(1, 0) - 2 * at(0, 0) + at(-1, 0)
+    xx = at(0, 1) - 2 * at(0, 0) + at(0, -1)
+    yx = (at(1, 1) - at(1, -1) - at(-1, 1) + at(-1, -1)) / 4
+    np.testing.assert_allclose(curvature(series, (y, x)),
+                               np.array([[yy, yx], [yx, xx]]) / h**2, rtol=1e-4, atol=1e-3)
 
 
 def test_flat_score_keeps_the_origin():

@@ -20,7 +20,7 @@ from unittest.mock import call, create_autospec, Mock
 import numpy as np
 import pytest
 
-from lmsco_ros.core import BoundingBox, BoxError, TrackerConfig, TrackState
+from lmsco_ros.core import BoundingBox, BoxError, TimeError, TrackerConfig, TrackState
 from lmsco_ros.core import track as track_module
 from lmsco_ros.core.config import LearningConfig, PresenceConfig, ScaleConfig
 from lmsco_ros.core.detection.detector import Detection
@@ -36,6 +36,7 @@ from lmsco_ros.core.weights.loading import Networks
 CONFIG = TrackerConfig(learning=LearningConfig(update_interval=2))
 START = BoundingBox(40, 30, 20, 10)
 AHEAD = START.moved_to((55, 36))
+MOVED = START.moved_to((53, 35))
 REGION = BoundingBox(0, 0, 80, 80)
 FIRST_RANGE, RANGE = IntensityRange(0, 1), IntensityRange(10, 20)
 PLAIN = FrameCondition(RANGE, shutter_closed=False, inverted=False, cut=False)
@@ -45,7 +46,7 @@ DOUBTED = Verdict(0.4, TrackState.UNCERTAIN, believed=True, learns=False)
 MISSED = Verdict(0.1, TrackState.UNCERTAIN, believed=False, learns=False)
 CLASSES = {'gain': 'AutomaticGain', 'detector': 'Detector', 'comparison': 'Comparison',
            'monitor': 'PresenceMonitor', 'observer': 'Observer', 'prediction': 'Prediction',
-           'redetection': 'Redetection'}
+           'redetection': 'Redetection', 'motion': 'TargetState'}
 
 
 def sighting(center, presence, peak=3.0, box=START):
@@ -78,6 +79,9 @@ def parts(monkeypatch):
     parts.prediction.expected.return_value, parts.prediction.misses = AHEAD, 0
     parts.scale.search_factors = (0.9, 1.0)
     parts.scale.found_factor.return_value = parts.scale.estimate.return_value = 1.0
+    parts.motion.box, parts.motion.velocity = MOVED, (2.0, -1.0)
+    parts.motion.covariance = np.eye(4)
+    monkeypatch.setattr(track_module, 'box_covariance', lambda *of: of)
     return parts
 
 
@@ -110,10 +114,11 @@ def test_plain_frame_is_seen_judged_followed_and_learned_in_this_order(parts, tr
     parts.reset_mock()
     track.advance(image())
     assert names(parts) == [
-        'gain.examine', 'prediction.expected', 'observer.look', 'monitor.believable',
-        'monitor.judge', 'scale.found_factor', 'scale.estimate', 'prediction.seen',
-        'redetection.restart', 'observer.keep', 'detector.remember', 'detector.train',
-        'scale.learn', 'prediction.expected', 'detector.watch']
+        'motion.predict', 'gain.examine', 'prediction.expected', 'observer.look',
+        'monitor.believable', 'monitor.judge', 'scale.found_factor', 'scale.estimate',
+        'prediction.seen', 'redetection.restart', 'observer.keep', 'motion.measure',
+        'detector.remember', 'detector.train', 'scale.learn', 'prediction.expected',
+        'detector.watch']
 
 
 def test_frame_is_examined_and_seen_in_its_range(parts, track):
@@ -163,7 +168,7 @@ def test_closed_shutter_shows_nothing_new(parts, track):
     parts.gain.examine.return_value = SHUT
     for _ in range(3):
         assert track.advance(image()) is before
-    assert set(names(parts)) == {'gain.examine'}
+    assert set(names(parts)) == {'motion.predict', 'gain.examine'}
 
 
 def test_first_frame_after_the_shutter_is_searched_whatever_is_seen(parts, track):
@@ -187,14 +192,16 @@ def test_frames_of_a_closed_shutter_are_not_counted(parts, track):
 def test_after_a_cut_nothing_is_expected_before_the_target_is_looked_for(parts, track):
     parts.gain.examine.return_value = CUT
     track.advance(image())
-    assert names(parts)[:7] == [
+    assert names(parts)[1:9] == [
         'gain.examine', 'monitor.note_cut', 'prediction.stop', 'redetection.restart',
-        'observer.forget', 'prediction.expected', 'observer.look']
+        'observer.forget', 'motion.forget_place', 'prediction.expected', 'observer.look']
+    parts.motion.forget_place.assert_called_once_with((120, 100))
 
 
 def test_frame_without_a_cut_forgets_nothing(parts, track):
     track.advance(image())
-    for unwanted in ('monitor.note_cut', 'prediction.stop', 'observer.forget'):
+    for unwanted in ('monitor.note_cut', 'prediction.stop', 'observer.forget',
+                     'motion.forget_place'):
         assert unwanted not in names(parts)
 
 
@@ -236,8 +243,49 @@ def test_target_that_is_not_believed_stays_where_it_was_and_counts_as_missed(par
     assert result.box == START and result.state is MISSED.state
     parts.prediction.missed.assert_called_once_with()
     for unwanted in ('prediction.seen', 'redetection.restart', 'observer.keep',
-                     'detector.remember', 'detector.train', 'scale.estimate'):
+                     'detector.remember', 'detector.train', 'scale.estimate',
+                     'motion.measure'):
         assert unwanted not in names(parts)
+
+
+def test_motion_goes_by_the_times_of_the_frames(parts):
+    track = Track(CONFIG, 'backend', Networks(), image(), START, 5.0)
+    parts.gain.examine.side_effect = [PLAIN, SHUT, PLAIN]
+    results = [track.advance(image(), time) for time in (5.1, 5.3, 5.4)]
+    assert [made.args[0] for made in parts.motion.predict.call_args_list] == pytest.approx(
+        [3.0, 6.0, 3.0])
+    assert results[-1].velocity == (60.0, -30.0)
+
+
+def test_frames_without_times_are_one_step_each(parts, track):
+    assert track.advance(image()).velocity == (2.0, -1.0)
+    parts.motion.predict.assert_called_once_with(1.0)
+
+
+def test_wrong_time_changes_nothing(parts, track):
+    with pytest.raises(TimeError, match='initialized on a frame with none'):
+        track.advance(image(), 5.0)
+    assert names(parts) == []
+    track.advance(image())
+
+
+def test_motion_takes_what_is_told_with_how_exactly_it_was_seen(parts):
+    track = started(parts, replace(CONFIG, scale=ScaleConfig(tolerance=1.0)))
+    parts.scale.estimate.return_value = 1.05
+    track.advance(image())
+    (box, covariance), = (made.args for made in parts.motion.measure.call_args_list)
+    assert box.size == pytest.approx(START.size) and box.center == pytest.approx((52, 36))
+    assert covariance == (HERE.detection, box)
+
+
+@pytest.mark.parametrize('moved, told', [
+    (MOVED, MOVED), (START.moved_to((500, 36)), BoundingBox(110, 31, 10, 10)),
+    (START.moved_to((118, -20)), BoundingBox(108, 0, 12, 5))])
+def test_motion_is_told_with_the_box_in_the_image(parts, track, moved, told):
+    parts.motion.box = moved
+    result = track.advance(image())
+    assert result.predicted_box.as_tuple() == pytest.approx(told.as_tuple())
+    assert result.covariance is parts.motion.covariance
 
 
 @pytest.mark.parametrize('verdict, distractors, kept', [
@@ -354,6 +402,7 @@ def test_parts_are_made_of_the_first_frame(parts, monkeypatch):
         parts.detector, parts.comparison, parts.monitor, parts.detector.return_value)
     made['redetection'].assert_called_once_with(
         CONFIG.search, parts.observer, parts.monitor, view, START)
+    made['motion'].assert_called_once_with(START)
     make_scale.assert_called_once_with(CONFIG.scale, START.size)
     parts.scale.learn.assert_called_once_with(view, START)
     parts.prediction.seen.assert_called_once_with(START.center)
