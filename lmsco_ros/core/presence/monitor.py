@@ -31,7 +31,7 @@ __all__ = ['PresenceMonitor']
 # Log-odds that the network gives a target like those of its training, and the part of the way
 # that the measure of another target follows in one frame.
 _USUAL_PRESENCE = 4.0
-_USUAL_RATE = 0.03
+_USUAL_RATE = 0.1
 
 # After a cut the target is likely to be somewhere in the picture, and looks different: score and
 # part of the other thresholds that it has to reach, and its least log-odds of presence. By then,

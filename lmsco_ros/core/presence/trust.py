@@ -57,7 +57,7 @@ class TrustModel:
     constant: float
 
 
-MEASURED = TrustModel(quality=1.26, likeness=1.53, presence=0.42, constant=1.81)
+MEASURED = TrustModel(quality=0.34, likeness=0.59, presence=1.38, constant=-1.12)
 UNMEASURED = TrustModel(quality=2.09, likeness=2.23, presence=0.0, constant=2.47)
 
 
