@@ -68,11 +68,11 @@ def pictures() -> Iterator[tuple[np.ndarray, list[tuple[BoundingBox, str]]]]:
     tracker, gain = LMSCOTracker(config), AutomaticGain(config.intensity)
     first, *others = islice(render_scene(SCENE), FRAME)
     result = tracker.initialize(first.image, first.box)
-    gain.examine(first.image)
+    gain.observe(first.image)
     for frame in others:
         before, result = result, tracker.update(frame.image)
-        condition = gain.examine(frame.image)
-    view = FrameView(frame.image, condition.intensity)
+        intensity = gain.observe(frame.image)
+    view = FrameView(frame.image, intensity)
     size = patch_size(result.box.size, config.sampling, config.cell)
     patch = view.patch(result.search_region, (size, size))
     height, width = frame.image.shape

@@ -31,7 +31,7 @@ import numpy.typing as npt
 
 from lmsco_ros.core import BoundingBox, track, TrackerConfig
 from lmsco_ros.core.config import IntensityConfig
-from lmsco_ros.core.imaging.gain import AutomaticGain, FrameCondition, IntensityRange
+from lmsco_ros.core.imaging.gain import AutomaticGain, FrameCondition, FrameSurvey, IntensityRange
 from lmsco_ros.evaluation.trackers.configured import ConfiguredTracker
 
 __all__ = ['first_range', 'min_max']
@@ -43,8 +43,9 @@ class _MinMax:
     def __init__(self, config: IntensityConfig) -> None:
         """Take the configuration, of which nothing is used."""
 
-    def examine(self, image: npt.NDArray) -> FrameCondition:
+    def examine(self, frame: FrameSurvey) -> FrameCondition:
         """Return the range of all numbers of a frame."""
+        image = frame.image
         values = image[np.isfinite(image)] if image.dtype.kind == 'f' else image
         low, high = float(values.min()), float(values.max())
         return FrameCondition(IntensityRange(low, max(high, low + 1)), False, False, False)
@@ -57,9 +58,9 @@ class _FirstRange:
         self._gain = AutomaticGain(config)
         self._range: IntensityRange | None = None
 
-    def examine(self, image: npt.NDArray) -> FrameCondition:
+    def examine(self, frame: FrameSurvey) -> FrameCondition:
         """Return the range of the first frame."""
-        self._range = self._range or self._gain.observe(image)
+        self._range = self._range or self._gain.examine(frame).intensity
         return FrameCondition(self._range, False, False, False)
 
 

@@ -13,7 +13,7 @@
 # limitations under the License.
 
 """
-How the time of a frame grows with the image, the target, the memory, the scales and the threads.
+How the time of a frame grows: image, target, memory, scales, threads, number of targets.
 
 Every curve varies one thing. Its points take turns, one update each, so that a slow moment of the
 machine meets them all; the memory of samples is full before the time is taken. Quoted are medians
@@ -38,7 +38,7 @@ from benchmarks.measurement import (
     CLOCKS, markdown_table, named_config, positive, PROCESSOR, take_turns, WALL)
 from benchmarks.scenes import Clip, moving_scene
 from benchmarks.stages import instrumented, Stage, StageClock, STAGES, TRAINING
-from lmsco_ros.core import LMSCOTracker, TrackerConfig, TrackState
+from lmsco_ros.core import MultiTracker, TrackerConfig, TrackState
 from lmsco_ros.core.backend import limit_threads
 from lmsco_ros.evaluation.report.style import looks, new_axes
 
@@ -50,6 +50,7 @@ TARGET_IMAGE = (1280, 1024)
 MEMORIES = (1, 10, 20, 30, 50, 80)
 SCALES = (1, 3, 7, 11, 17)
 THREADS = (1, 2)
+COUNTS = (1, 2, 4, 8, 16)
 
 
 @dataclass(frozen=True)
@@ -139,8 +140,9 @@ class Runner:
         self._point, self._clock = point, clock
         self.trained: list[bool] = []
         self.missed: list[bool] = []
-        self._tracker = LMSCOTracker(point.config)
-        self._tracker.initialize(point.clip.frames[0], point.clip.start)
+        self._tracker = MultiTracker(point.config)
+        for box in (point.clip.start, *point.clip.others):
+            self._tracker.initialize(point.clip.frames[0], box)
         self._done = 0
         for _ in range(point.config.learning.memory_size):
             self._advance()
@@ -159,10 +161,10 @@ class Runner:
         self.trained.append(TRAINING in self._clock.seconds)
 
     def _advance(self) -> bool:
-        """Track into the next frame; return whether the target was missed."""
+        """Track into the next frame; return whether a target was missed."""
         self._done += 1
-        result = self._tracker.update(self._point.clip.endless(self._done))
-        return result.state is not TrackState.TRACKING
+        results = self._tracker.update(self._point.clip.endless(self._done))
+        return any(result.state is not TrackState.TRACKING for result in results.values())
 
 
 def measure_curve(points: Sequence[Point], frames: int) -> dict[int, list[Cost]]:
@@ -235,12 +237,19 @@ def thread_points(config: TrackerConfig) -> list[Point]:
     return [Point(str(count), count, config, clip, count) for count in THREADS]
 
 
+def count_points(config: TrackerConfig) -> list[Point]:
+    """Return different numbers of targets in the same image."""
+    return [Point(str(count), count, config, moving_scene(
+        IMAGE, TARGET, CLIP_FRAMES, vehicles=count)) for count in COUNTS]
+
+
 CURVES: Mapping[str, Curve] = {
     'image': Curve('Size of the image, the same target', 'pixels of the image', image_points),
     'target': Curve('Size of the target, the same image', 'side in pixels', target_points, True),
     'memory': Curve('Samples in memory', 'samples', memory_points),
     'search': Curve('Scales searched by the filter', 'scales', scale_points),
     'threads': Curve('Threads', 'threads', thread_points),
+    'targets': Curve('Targets, one tracker', 'targets', count_points),
 }
 
 
@@ -262,6 +271,9 @@ def report_curve(name: str, config: TrackerConfig, frames: int, output: Path) ->
     own, wall = ([cost.average for cost in costs[column]] for column in (PROCESSOR, WALL))
     print(f'\n{points[-1].name} over {points[0].name}: {own[-1] / own[0]:.2f} '
           f'(on the clock {wall[-1] / wall[0]:.2f})')
+    if name == 'targets':
+        further = (own[-1] / own[0] - 1) / (points[-1].x - 1)
+        print(f'Each further target costs {further:.2f} of the first.')
     _draw(curve, points, costs, output / f'{name}.png')
 
 

@@ -19,6 +19,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import islice
+import math
 
 import cv2
 import numpy as np
@@ -51,12 +52,15 @@ class Clip:
         Images; the target is there in the first.
     truth : ndarray, shape (n, 4)
         True boxes, NaN where the target is absent.
+    others : tuple of BoundingBox
+        Further targets in the first frame.
 
     """
 
     name: str
     frames: list[np.ndarray]
     truth: np.ndarray
+    others: tuple[BoundingBox, ...] = ()
 
     @property
     def start(self) -> BoundingBox:
@@ -86,9 +90,10 @@ def recorded_clips(request: Request) -> Iterator[Clip]:
                        sequence.ground_truth[start:])
 
 
-def moving_scene(size: tuple[int, int], target: float, count: int, seed: int = 1) -> Clip:
+def moving_scene(size: tuple[int, int], target: float, count: int, seed: int = 1,
+                 vehicles: int = 1) -> Clip:
     """
-    Render a vehicle that crosses a landscape under a camera that pans the other way.
+    Render vehicles that cross a landscape under a camera that pans the other way.
 
     Parameters
     ----------
@@ -100,9 +105,14 @@ def moving_scene(size: tuple[int, int], target: float, count: int, seed: int = 1
         Number of frames.
     seed : int
         Decides landscape and noise.
+    vehicles : int
+        How many there are: one in the middle, several in rows and columns.
 
     """
     width, height = size
+    side = math.ceil(vehicles**0.5)
+    places = [((column + 0.5) / side * width, (row + 0.5) / side * height)
+              for row in range(side) for column in range(side)][:vehicles]
     rng = np.random.default_rng(seed)
     panorama = render_landscape(width + 16 + round(_PAN * count), height, 40, rng)
     sensor = Sensor((height, width), 5.0, 4.0, rng)
@@ -111,13 +121,15 @@ def moving_scene(size: tuple[int, int], target: float, count: int, seed: int = 1
         shift = np.array([[1, 0, _PAN * index], [0, 1, 0]], np.float64)
         scene = cv2.warpAffine(panorama, shift, size, borderMode=cv2.BORDER_REPLICATE,
                                flags=cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP)
-        body = _vehicle(width / 2 + _DRIVE * (index - count / 2), height / 2, target)
-        layer = rasterize(body, scene.shape)
-        view = scene[layer.rows, layer.columns]
-        view += layer.alpha * (layer.heat - view)
+        bodies = [_vehicle(x + _DRIVE * (index - count / 2), y, target) for x, y in places]
+        for body in bodies:
+            layer = rasterize(body, scene.shape)
+            view = scene[layer.rows, layer.columns]
+            view += layer.alpha * (layer.heat - view)
         frames.append(sensor.expose(scene, index / 30))
-        boxes.append(bounds(body).as_tuple())
-    return Clip(f'vehicle of {target:g} pixels', frames, np.array(boxes))
+        boxes.append([bounds(body) for body in bodies])
+    return Clip(f'vehicle of {target:g} pixels', frames,
+                np.array([first.as_tuple() for first, *_ in boxes]), tuple(boxes[0][1:]))
 
 
 def _vehicle(x: float, y: float, side: float) -> tuple[Capsule, ...]:

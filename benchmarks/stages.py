@@ -80,12 +80,13 @@ class Stage:
 
 # A stage counts its own time only: a patch taken for the extent belongs to `patch`.
 STAGES = (
+    Stage('gain', 'targets', 'survey'),
     Stage('gain', 'imaging.gain', 'AutomaticGain.examine'),
     Stage('patch', 'imaging.view', 'FrameView.patch'),
     Stage('motion', 'features.motion', 'MotionObserver.images'),
     Stage('optical flow', 'features.optical_flow', 'DenseFlow.__call__'),
     Stage('network in and out', 'features.network_channels', 'NetworkChannels.__call__'),
-    Stage('features', 'features.extractor', 'FeatureExtractor.__call__'),
+    Stage('features', 'features.extractor', 'FeatureExtractor._series'),
     Stage('scores', 'learning.structured_operator', 'StructuredOperator.scores'),
     Stage('peak', 'detection.detector', 'locate'),
     Stage('sharpness', 'detection.detector', 'peak_to_sidelobe_ratio'),

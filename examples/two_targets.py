@@ -13,12 +13,12 @@
 # limitations under the License.
 
 """
-Follow two targets through a folder of images: a tracker for each.
+Follow two targets through a folder of images with one tracker.
 
     python examples/two_targets.py frames/ 120,90,40,30 300,200,25,60
 
-Needs this package. Trackers share nothing, so each may have a configuration of its own, and one
-that loses its target does not disturb the other. The cost is that of both.
+Needs this package. Each target is followed as by a tracker of its own, and one that is lost does
+not disturb the other. But they know of each other: where they cross, none is taken for the other.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ from pathlib import Path
 
 import cv2
 
-from lmsco_ros.core import LMSCOTracker, TrackState
+from lmsco_ros.core import MultiTracker, TrackState
 
 
 def main(arguments: list[str] | None = None) -> None:
@@ -38,18 +38,17 @@ def main(arguments: list[str] | None = None) -> None:
     parser.add_argument('boxes', nargs='+', help='x,y,width,height in the first image')
     options = parser.parse_args(arguments)
 
-    trackers: list[LMSCOTracker] = []
+    tracker = MultiTracker()
     for path in sorted(options.folder.iterdir()):
         image = cv2.imread(str(path), cv2.IMREAD_UNCHANGED)
-        if trackers:
-            results = [tracker.update(image) for tracker in trackers]
+        if tracker.ids:
+            tracker.update(image)
         else:
-            trackers = [LMSCOTracker() for _ in options.boxes]
-            results = [tracker.initialize(image, [float(n) for n in box.split(',')])
-                       for tracker, box in zip(trackers, options.boxes)]
+            for box in options.boxes:
+                tracker.initialize(image, [float(number) for number in box.split(',')])
         told = ['lost' if result.state is TrackState.LOST else
                 '({:.1f}, {:.1f}, {:.1f}, {:.1f})'.format(*result.box.as_tuple())
-                for result in results]
+                for result in tracker.results.values()]
         print(path.name, *told)
 
 

@@ -38,6 +38,8 @@ import yaml
 
 from lmsco_ros.core import BoundingBox, LMSCOError, TrackerConfig
 from lmsco_ros.core.backend import limit_threads, select_backend
+from lmsco_ros.core.imaging.gain import survey
+from lmsco_ros.core.networks.together import Asking, at_once
 from lmsco_ros.core.presence.observer import Outlook, Sighting
 from lmsco_ros.core.presence.trust import regressors
 from lmsco_ros.core.track import Track
@@ -83,9 +85,9 @@ class RecordingTrack(Track):
 
     seen: tuple[tuple[float, float, float], BoundingBox] | None = None
 
-    def _look(self, outlook: Outlook) -> Sighting:
+    def _look(self, outlook: Outlook) -> Asking[Sighting]:
         """Return the best detection; keep what the coefficients multiply, and where it is."""
-        sighting = super()._look(outlook)
+        sighting = yield from super()._look(outlook)
         evidence = sighting.assessment.evidence
         hints = regressors(sighting.assessment.quality, evidence.likeness,
                            evidence.presence or 0.0)
@@ -156,7 +158,7 @@ def record(sequence: TrackingSequence, config: TrackerConfig) -> Records:
             track = None if absent[frame] else _start(config, image, BoundingBox(*truth[frame]))
             continue
         track.seen = None
-        track.advance(image)
+        at_once(track.advance(survey(image, config.intensity)))
         if track.seen is not None:
             seen, box = track.seen
             hints.append(seen)
@@ -167,7 +169,8 @@ def record(sequence: TrackingSequence, config: TrackerConfig) -> Records:
 def _start(config: TrackerConfig, image: npt.NDArray, box: BoundingBox) -> RecordingTrack | None:
     """Return a track from a box on, or None where nothing can be learned."""
     try:
-        return RecordingTrack(config, select_backend('cpu'), load_networks(config), image, box)
+        return RecordingTrack(config, select_backend('cpu'), load_networks(config),
+                              survey(image, config.intensity), box)
     except LMSCOError:
         return None
 

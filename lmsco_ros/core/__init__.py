@@ -17,12 +17,12 @@
 from lmsco_ros.core.config import TrackerConfig
 from lmsco_ros.core.errors import (
     BoxError, BusyError, ConfigError, ImageError, LMSCOError, NotInitializedError, TimeError,
-    WeightsError)
-from lmsco_ros.core.tracker import LMSCOTracker
+    UnknownTargetError, WeightsError)
+from lmsco_ros.core.tracker import LMSCOTracker, MultiTracker
 from lmsco_ros.core.types import BoundingBox, TrackResult, TrackState
 
 __all__ = [
     'BoundingBox', 'BoxError', 'BusyError', 'ConfigError', 'ImageError', 'LMSCOError',
-    'LMSCOTracker', 'NotInitializedError', 'TimeError', 'TrackerConfig', 'TrackResult',
-    'TrackState', 'WeightsError',
+    'LMSCOTracker', 'MultiTracker', 'NotInitializedError', 'TimeError', 'TrackerConfig',
+    'TrackResult', 'TrackState', 'UnknownTargetError', 'WeightsError',
 ]

@@ -43,6 +43,10 @@ class NotInitializedError(LMSCOError):
     """`update` was called before `initialize`."""
 
 
+class UnknownTargetError(LMSCOError):
+    """There is no target of that number."""
+
+
 class BusyError(LMSCOError):
     """A tracker was called while another call, of a second thread, was at work in it."""
 

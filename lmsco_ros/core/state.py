@@ -75,6 +75,23 @@ class FrameClock:
         """Frames in the unit of time: of a second, or 1 where frames have no times."""
         return 1.0 if self._last is None else _FRAMES_PER_SECOND
 
+    def check(self, time: float | None) -> float | None:
+        """
+        Return the time of a frame.
+
+        Raises
+        ------
+        TimeError
+            When the time is no finite number, or only one of this frame and the first has one.
+
+        """
+        now = _checked(time)
+        if (now is None) != (self._last is None):
+            has, had = ('no', 'one') if now is None else ('a', 'none')
+            raise TimeError(f'the frame has {has} time, but the target was initialized on a frame '
+                            f'with {had}; give the time of every frame, or of none')
+        return now
+
     def step(self, time: float | None) -> float:
         """
         Return how many frames have passed since the last one.
@@ -85,15 +102,10 @@ class FrameClock:
         Raises
         ------
         TimeError
-            When the time is no finite number, or only one of this frame and the first has one;
-            nothing changes then.
+            As :meth:`check`; nothing changes then.
 
         """
-        now = _checked(time)
-        if (now is None) != (self._last is None):
-            has, had = ('no', 'one') if now is None else ('a', 'none')
-            raise TimeError(f'the frame has {has} time, but the target was initialized on a frame '
-                            f'with {had}; give the time of every frame, or of none')
+        now = self.check(time)
         if now is None or self._last is None:
             return 1.0
         passed = now - self._last

@@ -16,7 +16,7 @@
 
 from __future__ import annotations
 
-import numpy as np
+from collections.abc import Sequence
 
 from lmsco_ros.core.backend import Backend
 from lmsco_ros.core.config import TrackerConfig
@@ -26,10 +26,12 @@ from lmsco_ros.core.detection.scale import found_factor, scale_factors
 from lmsco_ros.core.extent.fusion import EdgeFilter
 from lmsco_ros.core.extent.measurement import ExtentMeter
 from lmsco_ros.core.fourier.localization import centered_map
-from lmsco_ros.core.imaging.gain import AutomaticGain
+from lmsco_ros.core.imaging.gain import AutomaticGain, FrameSurvey
 from lmsco_ros.core.imaging.regions import check_box, clamp_box, visible_part
 from lmsco_ros.core.imaging.view import FrameView
+from lmsco_ros.core.networks.together import Asking
 from lmsco_ros.core.presence.monitor import PresenceMonitor
+from lmsco_ros.core.presence.neighbors import Neighbors
 from lmsco_ros.core.presence.observer import Observer, Outlook, Sighting
 from lmsco_ros.core.search.prediction import Prediction
 from lmsco_ros.core.search.redetection import Redetection
@@ -52,7 +54,7 @@ class Track:
         Where the filter is computed.
     networks : Networks
         What the configuration asks for.
-    image : ndarray
+    frame : FrameSurvey
         First frame.
     box : BoundingBox
         Target in the first frame.
@@ -71,15 +73,15 @@ class Track:
     """
 
     def __init__(self, config: TrackerConfig, backend: Backend, networks: Networks,
-                 image: np.ndarray, box: BoundingBox, time: float | None = None) -> None:
-        check_box(box, (image.shape[1], image.shape[0]))
+                 frame: FrameSurvey, box: BoundingBox, time: float | None = None) -> None:
+        check_box(box, (frame.image.shape[1], frame.image.shape[0]))
         self._clock, self._motion = FrameClock(time), TargetState(box)
         self._config = config
         self._box = box
         self._frame = 0
         self._after_shutter = False
         self._gain = AutomaticGain(config.intensity)
-        view = FrameView(image, self._gain.examine(image).intensity)
+        view = FrameView(frame.image, self._gain.examine(frame).intensity)
         self._detector = Detector(config, backend, networks, view, box)
         first = self._detector(view, box)
         self._first_peak = first.peak.value
@@ -93,20 +95,37 @@ class Track:
         self._detector.watch(view, box)
         self.result = self._describe(view, first, 1.0, TrackState.TRACKING)
 
-    def advance(self, image: np.ndarray, time: float | None = None) -> TrackResult:
-        """Find the target in the next frame, and learn from it if it can be trusted."""
+    def advance(self, frame: FrameSurvey, time: float | None = None,
+                others: Sequence[tuple[float, float]] = ()) -> Asking[TrackResult]:
+        """
+        Find the target in the next frame, and learn from it if it can be trusted.
+
+        It asks the networks, so that several targets may be looked for together.
+
+        Parameters
+        ----------
+        frame : FrameSurvey
+            The next frame.
+        time : float, optional
+            When it was taken, in seconds; None where frames have no times.
+        others : sequence of tuple of float
+            Where (x, y) other targets go, which are not to be taken for this one.
+
+        """
         self._motion.predict(self._clock.step(time))
-        condition = self._gain.examine(image)
+        condition = self._gain.examine(frame)
         if condition.shutter_closed:
             self._after_shutter = True
             return self.result
         self._frame += 1
         if condition.cut:
+            others = ()
             self._expect_nothing()
-            self._motion.forget_place((image.shape[1], image.shape[0]))
-        view = FrameView(image, condition.intensity)
-        outlook = Outlook(view, self._box, self._expected(view))
-        sighting = self._look(outlook)
+            self._motion.forget_place((frame.image.shape[1], frame.image.shape[0]))
+        view = FrameView(frame.image, condition.intensity)
+        neighbors = Neighbors(self.heading, tuple(others)) if others else None
+        outlook = Outlook(view, self._box, self._expected(view), neighbors)
+        sighting = yield from self._look(outlook)
         if self._after_shutter or not self._monitor.believable(sighting.assessment):
             sighting = self._search_elsewhere(outlook, sighting)
         self._after_shutter = False
@@ -122,6 +141,16 @@ class Track:
         self.result = self._describe(view, sighting.detection, verdict.score, verdict.state)
         return self.result
 
+    def check_time(self, time: float | None) -> None:
+        """Raise TimeError unless the next frame may have that time."""
+        self._clock.check(time)
+
+    @property
+    def heading(self) -> tuple[float, float]:
+        """Where (x, y) the target gets to in the next frame, if it goes on as before."""
+        (x, y), (right, down) = self._box.center, self._prediction.velocity
+        return x + right, y + down
+
     def _expect_nothing(self) -> None:
         """Expect nothing of a view that has changed at once, but that it shows the target."""
         self._monitor.note_cut()
@@ -133,9 +162,9 @@ class Track:
         """Return where the target is expected next."""
         return self._prediction.expected(self._box, view.size)
 
-    def _look(self, outlook: Outlook) -> Sighting:
+    def _look(self, outlook: Outlook) -> Asking[Sighting]:
         """Return what is where the target is expected."""
-        return self._observer.look(outlook, scale_factors(self._config.scale))
+        return (yield from self._observer.look(outlook, scale_factors(self._config.scale)))
 
     def _search_elsewhere(self, outlook: Outlook, here: Sighting) -> Sighting:
         """Return what convinces most in other places of the image, or what is here."""

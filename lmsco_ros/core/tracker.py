@@ -13,7 +13,7 @@
 # limitations under the License.
 
 """
-The LMSCO tracker: one frame's way from image to box.
+The LMSCO tracker, of one target or several: one frame's way from image to box.
 
 image -> intensity -> patches -> feature series -> score -> peak -> box, and every few frames
 memory -> collaborative optimization -> filter.
@@ -21,26 +21,18 @@ memory -> collaborative optimization -> filter.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
-import copy
-from threading import Lock
-from typing import Any
+from collections.abc import Collection, Sequence
 
 import numpy as np
 
-from lmsco_ros.core.backend import limit_threads, select_backend
-from lmsco_ros.core.config import TrackerConfig
-from lmsco_ros.core.errors import BusyError, ConfigError, ImageError, NotInitializedError
-from lmsco_ros.core.imaging.frame import read_frame
-from lmsco_ros.core.track import Track
+from lmsco_ros.core.errors import NotInitializedError, UnknownTargetError
+from lmsco_ros.core.targets import ConfiguredTargets
 from lmsco_ros.core.types import BoundingBox, TrackResult
-from lmsco_ros.core.weights.loading import load_networks
 
-__all__ = ['LMSCOTracker']
+__all__ = ['LMSCOTracker', 'MultiTracker']
 
 
-class LMSCOTracker:
+class LMSCOTracker(ConfiguredTargets):
     """
     Follows one target through the frames of a thermal camera.
 
@@ -70,31 +62,10 @@ class LMSCOTracker:
 
     """
 
-    def __init__(self, config: TrackerConfig | str | None = None) -> None:
-        self.config = _configuration(config)
-        self._backend = select_backend(self.config.runtime.device)
-        self._networks = load_networks(self.config)
-        limit_threads(self.config.runtime.threads)
-        self._track: Track | None = None
-        self._kind = ''
-        self._lock = Lock()
-
-    def __getstate__(self) -> dict[str, Any]:
-        """Return a copy of everything but the lock, as it is between two calls."""
-        with self._alone():
-            return copy.deepcopy({name: value for name, value in vars(self).items()
-                                  if name != '_lock'})
-
-    def __setstate__(self, state: dict[str, Any]) -> None:
-        """Become the tracker whose state this is."""
-        vars(self).update(state)
-        self._lock = Lock()
-        limit_threads(self.config.runtime.threads)
-
     @property
     def initialized(self) -> bool:
         """Whether there is a target to follow."""
-        return self._track is not None
+        return bool(self._targets)
 
     def initialize(self, image: np.ndarray, box: BoundingBox | Sequence[float] | np.ndarray,
                    time: float | None = None) -> TrackResult:
@@ -125,11 +96,8 @@ class LMSCOTracker:
 
         """
         with self._alone():
-            frame = read_frame(image)
-            track = Track(self.config, self._backend, self._networks, frame.pixels,
-                          BoundingBox.of(box), time)
-            self._track, self._kind = track, frame.kind
-            return track.result
+            number = self._targets.start(image, box, time, self._targets.ids)
+            return self._targets.results[number]
 
     def update(self, image: np.ndarray, time: float | None = None) -> TrackResult:
         """
@@ -153,38 +121,134 @@ class LMSCOTracker:
 
         """
         with self._alone():
-            if self._track is None:
+            if not self._targets:
                 raise NotInitializedError('there is no target; call initialize(image, box) first')
-            frame = read_frame(image)
-            if frame.kind != self._kind:
-                raise ImageError(f'the frame is {frame.kind}, but the target was initialized in '
-                                 f'{self._kind}; initialize again')
-            return self._track.advance(frame.pixels, time)
+            result, = self._targets.advance(image, time).values()
+            return result
 
     def reset(self) -> None:
         """Forget the target."""
         with self._alone():
-            self._track = None
-
-    @contextmanager
-    def _alone(self) -> Iterator[None]:
-        """Refuse what another call would get in the way of."""
-        if not self._lock.acquire(blocking=False):
-            raise BusyError('the tracker is at work on another call, of a second thread or of a '
-                            'signal handler; expected one call at a time: wait for it, or make '
-                            'a tracker for each thread. The target is kept')
-        try:
-            yield
-        finally:
-            self._lock.release()
+            self._targets.clear()
 
 
-def _configuration(given: object) -> TrackerConfig:
-    """Return the configuration, or the preset of a name; that called default without one."""
-    if isinstance(given, TrackerConfig):
-        return given
-    if given is None or isinstance(given, str):
-        return TrackerConfig.preset('default' if given is None else given)
-    remedy = 'from_dict(...)' if isinstance(given, Mapping) else 'from_yaml(path)'
-    raise ConfigError(f'the configuration is a {type(given).__name__}; expected a TrackerConfig '
-                      f'or the name of a preset: give TrackerConfig.{remedy}')
+class MultiTracker(ConfiguredTargets):
+    """
+    Follows any number of targets through the frames of a thermal camera.
+
+    Each target is told by its number, its id, which grows from 1 with every start and is never
+    used again. What is said of a target is what a tracker of its own says, but that none is
+    taken for another one that is known: where they meet, targets keep their numbers. Each frame
+    is read and measured once for all.
+
+    Images, copies and pickles are those of :class:`LMSCOTracker`.
+
+    Parameters
+    ----------
+    config : TrackerConfig or str
+        How to track, or the name of a preset; the preset 'default' unless given.
+
+    Raises
+    ------
+    ConfigError
+        When there is no preset of that name, the configured device is not available, or a
+        network does not fit its blocks.
+    WeightsError
+        When the weights of a network are missing or damaged.
+    BusyError
+        From every method: when another thread is at work in this tracker. Nothing changes then.
+
+    """
+
+    @property
+    def ids(self) -> tuple[int, ...]:
+        """Numbers of the targets, in the order of their starts."""
+        return self._targets.ids
+
+    @property
+    def results(self) -> dict[int, TrackResult]:
+        """What was last said of each target, by its number."""
+        return self._targets.results
+
+    def initialize(self, image: np.ndarray, box: BoundingBox | Sequence[float] | np.ndarray,
+                   time: float | None = None, in_place_of: Collection[int] = ()) -> int:
+        """
+        Start to follow one more target; the others wait for their next frame.
+
+        Parameters
+        ----------
+        image : ndarray
+            Frame that shows the target.
+        box : BoundingBox, or four numbers
+            The target in that frame, (x, y, width, height) in pixels. It may reach over the
+            border, with a quarter of its area inside, but not be larger than the image.
+        time : float, optional
+            When the frame was taken, in seconds on any clock; then every frame has a time.
+        in_place_of : collection of int
+            Targets that are forgotten for it.
+
+        Returns
+        -------
+        int
+            Number of the target; `results` has its first result.
+
+        Raises
+        ------
+        ImageError, BoxError, TimeError
+            When nothing can be learned from the box, or the frame or its time does not fit those
+            of the targets that stay; nothing changes.
+
+        """
+        with self._alone():
+            return self._targets.start(image, box, time, in_place_of)
+
+    def update(self, image: np.ndarray, time: float | None = None,
+               only: Collection[int] | None = None) -> dict[int, TrackResult]:
+        """
+        Find the targets in their next frame.
+
+        Parameters
+        ----------
+        image : ndarray
+            Frame of the same size and type as the first one. Without targets it may be any.
+        time : float, optional
+            When it was taken, as for :class:`LMSCOTracker`.
+        only : collection of int, optional
+            Targets whose next frame it is, where one that was started late catches up; all
+            unless given.
+
+        Returns
+        -------
+        dict of int to TrackResult
+            What there is to say of each target, by its number.
+
+        Raises
+        ------
+        ImageError, TimeError
+            When the frame or its time does not fit the first one; the targets are kept.
+
+        """
+        with self._alone():
+            return self._targets.advance(image, time, only) if self._targets else {}
+
+    def drop(self, number: int) -> None:
+        """
+        Forget a target.
+
+        Raises
+        ------
+        UnknownTargetError
+            When there is none of that number.
+
+        """
+        with self._alone():
+            if number not in self._targets.ids:
+                raise UnknownTargetError(
+                    f'there is no target {number}; followed are '
+                    + (', '.join(map(str, self._targets.ids)) or 'none'))
+            self._targets.drop(number)
+
+    def reset(self) -> None:
+        """Forget all targets."""
+        with self._alone():
+            self._targets.clear()

@@ -67,10 +67,10 @@ def test_stage_counts_its_own_time_only():
 
 def test_instruments_leave_the_core_as_it_was():
     """What is put in the place of a function is taken away again."""
-    before = FeatureExtractor.__call__
+    before = FeatureExtractor._series
     with instrumented(StageClock(lambda: 0.0), CallRecorder()) as missing:
-        assert FeatureExtractor.__call__ is not before
-    assert FeatureExtractor.__call__ is before and not missing
+        assert FeatureExtractor._series is not before
+    assert FeatureExtractor._series is before and not missing
 
 
 def test_missing_stage_is_named(monkeypatch):
@@ -187,6 +187,25 @@ def test_scaling_draws_each_curve(tmp_path, monkeypatch, capsys):
     scaling.main(['--curve', 'memory', '--frames', '5', '--output', str(tmp_path)])
     assert '2 over 1: ' in capsys.readouterr().out
     assert (tmp_path / 'memory.png').read_bytes().startswith(b'\x89PNG')
+
+
+def test_scaling_tells_what_a_further_target_costs(tmp_path, monkeypatch, capsys):
+    """Every vehicle of the scene is followed, and they cost more than one."""
+    monkeypatch.setattr(scaling, 'COUNTS', (1, 3))
+    scaling.main(['--curve', 'targets', '--frames', '5', '--output', str(tmp_path)])
+    printed = capsys.readouterr().out
+    assert '| 3 | ' in printed and printed.count('100%') == 2
+    assert 0 < float(printed.split('Each further target costs ')[1].split()[0]) < 2
+
+
+def test_vehicles_are_where_their_boxes_are():
+    """Further ones are other places, and as warm."""
+    clip = scenes.moving_scene((640, 512), 40, 2, vehicles=5)
+    assert len(clip.others) == 4 and clip.start not in clip.others
+    for box in (clip.start, *clip.others):
+        x, y, width, height = np.round(box.as_tuple()).astype(int)
+        inside = clip.frames[0][y:y + height, x:x + width]
+        assert np.median(inside) > np.percentile(clip.frames[0], 95)
 
 
 @pytest.mark.parametrize('name', ['vgg_m_2048', 'motion_cnn'])

@@ -261,7 +261,7 @@ def test_copies_go_on_as_the_original_does(scene, config, duplicate):
 def test_copy_keeps_its_threads_and_serves_other_threads(scene, monkeypatch):
     original = LMSCOTracker('hcs')
     counts = []
-    monkeypatch.setattr('lmsco_ros.core.tracker.limit_threads', counts.append)
+    monkeypatch.setattr('lmsco_ros.core.targets.limit_threads', counts.append)
     image = scene.frame((40, 60))
     assert pickled(original).initialize(image, BOX).box == BoundingBox(*BOX)
     assert counts == [original.config.runtime.threads]

@@ -396,7 +396,7 @@ def test_former_target_is_freed_without_the_garbage_collector(scene, preset):
         # A frame without the target and one with it: everything is looked at once.
         tracker.update(scene.frame((-50, -50)))
         tracker.update(later(scene))
-        former = weakref.ref(tracker._track)
+        former = weakref.ref(tracker._targets._tracks[1])
         tracker.initialize(later(scene, 2), box_of())
         assert former() is None
     finally:

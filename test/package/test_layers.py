@@ -28,11 +28,10 @@ PACKAGES = (
     ('visualization', 'msg_adapters'), ('synthetic', 'media'), ('core',),
     ('extras',))
 CORE = (
-    ('tracker',), ('track',), ('search',), ('presence',), ('detection',),
-    ('extent', 'features', 'state'),
-    ('weights', 'learning'), ('imaging', 'fourier'), ('config', 'networks', 'backend', 'types'),
-    ('errors',))
-MOST_ROOMS = 17
+    ('tracker',), ('targets',), ('track',), ('search',), ('presence',), ('detection',),
+    ('extent', 'features', 'state'), ('weights', 'learning'), ('imaging', 'fourier'),
+    ('config', 'networks', 'backend', 'types'), ('errors',))
+MOST_ROOMS = 18
 # ROS, and what needs it.
 ABOVE_THE_CORE = ('rclpy', '_msgs', '_interfaces', 'std_srvs', 'msg_adapters')
 

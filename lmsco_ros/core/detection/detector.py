@@ -16,7 +16,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -32,6 +32,7 @@ from lmsco_ros.core.imaging.regions import patch_size, region_around
 from lmsco_ros.core.imaging.view import FrameView
 from lmsco_ros.core.learning.memory import score
 from lmsco_ros.core.learning.structured_operator import StructuredOperator
+from lmsco_ros.core.networks.together import Asking, at_once
 from lmsco_ros.core.types import BoundingBox
 from lmsco_ros.core.weights.loading import Networks
 
@@ -85,6 +86,11 @@ class Detection:
         return [shift(series, displacement) for series in self.sample]
 
 
+def _everywhere(places: np.ndarray) -> np.ndarray:
+    """Return that every place comes into question."""
+    return np.ones(places.shape[:-1], bool)
+
+
 class Detector:
     """
     Features and filter of one target.
@@ -133,9 +139,15 @@ class Detector:
             Scales at which it is searched, relative to the size of `box`.
 
         """
+        return at_once(self.ask(view, box, factors))
+
+    def ask(self, view: FrameView, box: BoundingBox,
+            factors: Sequence[float] = (1.0,)) -> Asking[Detection]:
+        """Search as `__call__` does, and ask for the passes of the networks."""
         regions = [region_around(box.scaled(factor), self._config.sampling) for factor in factors]
         patches = np.stack([self._patch(view, region) for region in regions])
-        samples = self._extractor(patches, self._moving(regions, patches, factors))
+        samples = yield from self._extractor.ask(
+            patches, self._moving(regions, patches, factors))
         scores = self._operator.scores(samples)
         grid = grid_size(int(scores.shape[1]) - 1)
         peak = locate(scores, grid, self._config.sampling.newton_steps)
@@ -151,7 +163,8 @@ class Detector:
         series = to_numpy(score(sample, self._first_filters))[..., 0]
         return refine(series, detection.peak.displacement, 0)[1]
 
-    def near(self, detection: Detection, place: tuple[float, float]) -> Detection:
+    def near(self, detection: Detection, place: tuple[float, float],
+             owned: Callable[[np.ndarray], np.ndarray] = _everywhere) -> Detection:
         """
         Return the detection at the highest score within half a target of a place.
 
@@ -161,6 +174,8 @@ class Detector:
             Another peak of the same score.
         place : tuple of float
             Image position (x, y).
+        owned : callable
+            Tells which image positions, shape (..., 2), come into question.
 
         """
         grid = detection.peak.grid
@@ -169,11 +184,14 @@ class Detector:
         middle = [round(t * size) for t in detection.displacement_to(place)]
         around = np.arange(-reach, reach + 1)
         rows, columns = (middle[0] + around) % size, (middle[1] + around) % size
-        square = grid[np.ix_(rows, columns)]
+        ty, tx = ((t / size + 0.5) % 1.0 - 0.5 for t in (rows, columns))
+        places = np.stack(detection.image_position(np.meshgrid(ty, tx, indexing='ij')), axis=-1)
+        square = np.where(owned(places), grid[np.ix_(rows, columns)], -np.inf)
         row, column = np.unravel_index(np.argmax(square), square.shape)
-        start = tuple((t / size + 0.5) % 1.0 - 0.5 for t in (rows[row], columns[column]))
-        displacement, value = refine(to_numpy(detection.scores), (start[0], start[1]),
-                                     self._config.sampling.newton_steps)
+        start, series = (float(ty[row]), float(tx[column])), to_numpy(detection.scores)
+        displacement, value = refine(series, start, self._config.sampling.newton_steps)
+        if not owned(np.array(detection.image_position(displacement))):
+            displacement, value = refine(series, start, 0)
         peak = replace(detection.peak, displacement=displacement, value=value)
         return replace(detection, peak=peak,
                        sharpness=detection.sharpness * value / detection.peak.value)

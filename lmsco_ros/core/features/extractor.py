@@ -28,6 +28,7 @@ from lmsco_ros.core.features.hog import hog
 from lmsco_ros.core.features.intensity_channels import intensity_channels
 from lmsco_ros.core.features.projection import Projection
 from lmsco_ros.core.fourier.interpolation import interpolate, interpolation_series
+from lmsco_ros.core.networks.together import Ask, Asking, at_once
 from lmsco_ros.core.weights.loading import Networks
 
 if TYPE_CHECKING:
@@ -92,9 +93,16 @@ class FeatureExtractor:
             Series of the interpolated, normalized, windowed channels.
 
         """
+        return at_once(self.ask(patches, flow))
+
+    def ask(self, patches: np.ndarray,
+            flow: np.ndarray | None = None) -> Asking[list[Array]]:
+        """Return the series as `__call__` does, and ask for the passes of the networks."""
         inputs = {'appearance': patches, 'motion': flow}
-        maps = {kind: run(given) for kind, run in self._passes.items()
-                if (given := inputs[kind]) is not None}
+        maps = {}
+        for kind, run in self._passes.items():
+            if (given := inputs[kind]) is not None:
+                maps[kind] = yield Ask(run.whom, run.together, given)
         return [self._series(block, patches, maps) for block in self._blocks]
 
     def _series(self, block: _Block, patches: np.ndarray, maps: Mapping[str, Maps]

@@ -16,7 +16,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Hashable, Iterable, Sequence
 
 import numpy as np
 import torch
@@ -67,9 +67,23 @@ class NetworkChannels:
         self._network = network.to(self._device)
         self._size = size
 
+    @property
+    def whom(self) -> Hashable:
+        """The same for all of these that give the same channels of the same patches."""
+        return (id(self._network), self._size, *self._requests)
+
     def channels(self, layer: str) -> int:
         """Return the number of channels of a layer."""
         return self._network.layers[self._network.layer_name(layer)].channels
+
+    def together(self, several: Sequence[np.ndarray]) -> list[dict[tuple[str, int], Array]]:
+        """Return, for each of several patches as `__call__` takes them, what that returns."""
+        if len(several) == 1:
+            return [self(several[0])]
+        maps = self(np.concatenate(several))
+        ends = np.cumsum([len(patches) for patches in several])
+        return [{request: channels[end - len(patches):end] for request, channels in maps.items()}
+                for patches, end in zip(several, ends, strict=True)]
 
     @torch.inference_mode()
     def __call__(self, patches: np.ndarray) -> dict[tuple[str, int], Array]:

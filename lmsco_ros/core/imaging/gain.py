@@ -23,9 +23,9 @@ import numpy as np
 from lmsco_ros.core.config import IntensityConfig
 from lmsco_ros.core.errors import ImageError
 from lmsco_ros.core.imaging.sampled import credible_values, percentiles, take_probe
-from lmsco_ros.core.imaging.scene_change import same_picture, SceneMonitor
+from lmsco_ros.core.imaging.scene_change import same_picture, scene_pattern, SceneMonitor
 
-__all__ = ['AutomaticGain', 'FrameCondition', 'IntensityRange']
+__all__ = ['AutomaticGain', 'FrameCondition', 'FrameSurvey', 'IntensityRange', 'survey']
 
 # Below this the inverse of a range is no number any more.
 _NARROWEST = 1e-30
@@ -58,6 +58,54 @@ class IntensityRange:
     def turned(self) -> IntensityRange:
         """Return the range with warm and cold in each other's place."""
         return IntensityRange(self.high, self.low)
+
+
+@dataclass(frozen=True, eq=False)
+class FrameSurvey:
+    """
+    A frame with all that can be said of it without the frames before: once for all targets.
+
+    Attributes
+    ----------
+    image : ndarray
+        The frame, as `read_frame` returns it; not copied.
+    probe : ndarray, shape (h, w)
+        A regular subset of its pixels.
+    pattern : ndarray or None
+        What of the scene is compared with other frames; None when it shows nothing.
+    upright, mirrored : IntensityRange
+        Percentiles of its counts, counted from below and from above.
+
+    """
+
+    image: np.ndarray
+    probe: np.ndarray
+    pattern: np.ndarray | None
+    upright: IntensityRange
+    mirrored: IntensityRange
+
+
+def survey(image: np.ndarray, config: IntensityConfig) -> FrameSurvey:
+    """
+    Measure a frame on a regular subset of its pixels.
+
+    Parameters
+    ----------
+    image : ndarray
+        As `read_frame` returns it; pixels without a finite value do not count.
+    config : IntensityConfig
+        Percentiles.
+
+    Raises
+    ------
+    ImageError
+        When no pixel is finite.
+
+    """
+    probe = take_probe(image)
+    upright, mirrored = _measure(image, probe, config)
+    pattern = scene_pattern(probe, upright.low, upright.high)
+    return FrameSurvey(image, probe, pattern, upright, mirrored)
 
 
 @dataclass(frozen=True)
@@ -109,48 +157,18 @@ class AutomaticGain:
 
     def observe(self, image: np.ndarray) -> IntensityRange:
         """Return the range for this frame, seen on a regular subset of its pixels."""
-        return self.examine(image).intensity
+        return self.examine(survey(image, self._config)).intensity
 
-    def examine(self, image: np.ndarray) -> FrameCondition:
-        """
-        Take note of a frame and return what it is like.
-
-        Parameters
-        ----------
-        image : ndarray
-            As `read_frame` returns it; pixels without a finite value do not count.
-
-        Raises
-        ------
-        ImageError
-            When no pixel is finite; the frame is then forgotten.
-
-        """
-        probe = take_probe(image)
-        upright, mirrored = self._measure(image, probe)
-        change = self._scene.observe(probe, upright.low, upright.high)
+    def examine(self, frame: FrameSurvey) -> FrameCondition:
+        """Take note of a frame and return what it is like."""
+        change = self._scene.observe(frame.pattern)
         inverted = self._scene.inverted
-        self._range = self._follow(mirrored if inverted else upright,
+        self._range = self._follow(frame.mirrored if inverted else frame.upright,
                                    at_once=change.switched or change.cut)
-        closed = self._probe is not None and same_picture(self._probe, probe)
-        self._probe = probe
+        closed = self._probe is not None and same_picture(self._probe, frame.probe)
+        self._probe = frame.probe
         return FrameCondition(self._range.turned() if inverted else self._range, closed, inverted,
                               change.cut)
-
-    def _measure(self, image: np.ndarray,
-                 probe: np.ndarray) -> tuple[IntensityRange, IntensityRange]:
-        """Return the percentiles of a frame, counted from below and from above."""
-        values = probe[np.isfinite(probe)] if probe.dtype == np.float32 else probe.ravel()
-        if values.size == 0:
-            raise ImageError('the image has no finite pixel; expected counts or temperatures')
-        low, high = self._config.low_percentile, self._config.high_percentile
-        shares = (low, high, 100 - high, 100 - low)
-        start, *ends, end = percentiles(values, (_MOST[0], *shares, _MOST[1]))
-        if max(start - min(ends), max(ends) - end) > _FAR * (end - start):
-            credible = credible_values(image, probe, end - start)
-            if credible.size and credible.max() > credible.min():
-                values, ends = credible, percentiles(credible, shares)
-        return _range(values, *ends[:2]), _range(values, *ends[2:])
 
     def _follow(self, measured: IntensityRange, at_once: bool) -> IntensityRange:
         """Return the range after one more frame."""
@@ -165,6 +183,22 @@ class AutomaticGain:
         assert self._range is not None
         change = max(abs(measured.low - self._range.low), abs(measured.high - self._range.high))
         return change > self._config.jump * (self._range.high - self._range.low)
+
+
+def _measure(image: np.ndarray, probe: np.ndarray,
+             config: IntensityConfig) -> tuple[IntensityRange, IntensityRange]:
+    """Return the percentiles of a frame, counted from below and from above."""
+    values = probe[np.isfinite(probe)] if probe.dtype == np.float32 else probe.ravel()
+    if values.size == 0:
+        raise ImageError('the image has no finite pixel; expected counts or temperatures')
+    low, high = config.low_percentile, config.high_percentile
+    shares = (low, high, 100 - high, 100 - low)
+    start, *ends, end = percentiles(values, (_MOST[0], *shares, _MOST[1]))
+    if max(start - min(ends), max(ends) - end) > _FAR * (end - start):
+        credible = credible_values(image, probe, end - start)
+        if credible.size and credible.max() > credible.min():
+            values, ends = credible, percentiles(credible, shares)
+    return _range(values, *ends[:2]), _range(values, *ends[2:])
 
 
 def _range(values: np.ndarray, low: float, high: float) -> IntensityRange:

@@ -20,7 +20,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-__all__ = ['same_picture', 'SceneChange', 'SceneMonitor']
+__all__ = ['same_picture', 'SceneChange', 'SceneMonitor', 'scene_pattern']
 
 # Consecutive frames of real sequences, camera in motion or not, correlate above -0.02, and
 # mostly above 0.8: an inverted one lies far on the other side.
@@ -85,19 +85,16 @@ class SceneMonitor:
         """Whether the polarity is not the one of the first frame."""
         return self._inverted
 
-    def observe(self, probe: np.ndarray, low: float, high: float) -> SceneChange:
+    def observe(self, pattern: np.ndarray | None) -> SceneChange:
         """
         Take note of a frame and return what has just changed.
 
         Parameters
         ----------
-        probe : ndarray, shape (h, w)
-            Probe of the frame; pixels that are not finite do not count.
-        low, high : float
-            Range of its counts; what lies outside is cut off.
+        pattern : ndarray or None
+            What `scene_pattern` returns for the frame.
 
         """
-        pattern = _pattern(probe, low, high)
         if pattern is None:
             return SceneChange()
         before, self._pattern = self._pattern, pattern
@@ -109,8 +106,18 @@ class SceneMonitor:
         return SceneChange(switched, not switched and correlation < _CUT_CORRELATION)
 
 
-def _pattern(probe: np.ndarray, low: float, high: float) -> np.ndarray | None:
-    """Return the probe as a vector of mean 0 and length 1, None when it shows nothing."""
+def scene_pattern(probe: np.ndarray, low: float, high: float) -> np.ndarray | None:
+    """
+    Return a frame's probe as a vector of mean 0 and length 1, None when it shows nothing.
+
+    Parameters
+    ----------
+    probe : ndarray, shape (h, w)
+        Probe of the frame; pixels that are not finite do not count.
+    low, high : float
+        Range of its counts; what lies outside is cut off.
+
+    """
     values = probe.astype(np.float32).ravel()
     values -= np.float32(low)
     values *= np.float32(1 / (high - low))

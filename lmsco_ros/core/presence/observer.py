@@ -23,9 +23,11 @@ import math
 from lmsco_ros.core.detection.detector import Detection, Detector
 from lmsco_ros.core.imaging.view import FrameView
 from lmsco_ros.core.extent.measurement import ExtentMeter, Measurement
+from lmsco_ros.core.networks.together import Asking
 from lmsco_ros.core.presence.distractors import Distractors
 from lmsco_ros.core.presence.evidence import Assessment, Evidence
 from lmsco_ros.core.presence.monitor import PresenceMonitor
+from lmsco_ros.core.presence.neighbors import Neighbors
 from lmsco_ros.core.types import BoundingBox
 
 __all__ = ['Observer', 'Outlook', 'Sighting']
@@ -44,12 +46,20 @@ class Outlook:
         The target where it was seen last.
     expected : BoundingBox
         Where it is expected in this frame.
+    neighbors : Neighbors or None
+        Other targets; None where there are none.
 
     """
 
     view: FrameView
     last: BoundingBox
     expected: BoundingBox
+    neighbors: Neighbors | None = None
+
+    def is_neighbor(self, detection: Detection) -> bool:
+        """Return whether another target was detected."""
+        return self.neighbors is not None and self.neighbors.claim(
+            detection.center, self.expected.area**0.5)
 
 
 @dataclass(frozen=True)
@@ -101,9 +111,11 @@ class Observer:
         self._distractors = Distractors()
         self._first_likeness = detector.likeness(first)
 
-    def look(self, outlook: Outlook, factors: Sequence[float]) -> Sighting:
+    def look(self, outlook: Outlook, factors: Sequence[float]) -> Asking[Sighting]:
         """
         Return what is around the expected place, or just there where that is a distractor.
+
+        It asks the networks, so that several targets may be looked for together.
 
         Parameters
         ----------
@@ -114,7 +126,10 @@ class Observer:
 
         """
         self._distractors.next_frame()
-        detection = self._detector(outlook.view, outlook.expected, factors)
+        detection = yield from self._detector.ask(outlook.view, outlook.expected, factors)
+        if outlook.neighbors is not None and outlook.is_neighbor(detection):
+            detection = self._detector.near(
+                detection, outlook.neighbors.own, outlook.neighbors.owned)
         if self.is_distractor(outlook, detection):
             detection = self._detector.near(detection, outlook.expected.center)
         return self.weigh(outlook, detection, outlook.expected)
@@ -125,6 +140,8 @@ class Observer:
 
     def weigh(self, outlook: Outlook, detection: Detection, box: BoundingBox) -> Sighting:
         """Return a detection around a box, measured, with all that speaks for it."""
+        # One by one: what is measured decides where the next frame is looked at, and so has to be
+        # the same bits with one target and with several.
         measured = None if self._meter is None else self._meter(
             outlook.view, box.moved_to(detection.center))
         likeness = self._detector.likeness(detection) / self._first_likeness
@@ -135,7 +152,8 @@ class Observer:
 
     def is_distractor(self, outlook: Outlook, detection: Detection) -> bool:
         """Return whether something else than the target was detected; if so, note its place."""
-        return self._distractors.explain(detection.center, outlook.last, self._resembles)
+        return outlook.is_neighbor(detection) or self._distractors.explain(
+            detection.center, outlook.last, self._resembles)
 
     def follow_distractors(self, outlook: Outlook) -> None:
         """Watch the known distractors, or they get away from their places and look new."""

@@ -44,6 +44,11 @@ class Prediction:
         """Number of frames since the target was seen."""
         return self._misses
 
+    @property
+    def velocity(self) -> _Point:
+        """Mean way (x, y) of a frame, in pixels."""
+        return self._velocity
+
     def seen(self, center: _Point) -> None:
         """Take note of where the target is in this frame."""
         if self._last is not None and not self._misses:

@@ -236,6 +236,22 @@ def test_half_a_target_around_a_place_is_searched(detector, ridged, row, column)
     assert near.peak.displacement == pytest.approx(wrapped)
 
 
+def test_peak_near_a_place_is_one_that_comes_into_question(detector, ridged):
+    """The highest points lie at the last indices, which are left of and above the middle."""
+    grid, size, detection = ridged
+    reach, (x, y) = round(size / 8), detection.region.center
+    near = detector.near(detection, (x, y), lambda places: places[..., 0] > x - 0.5)
+    assert near.center == pytest.approx((x + reach, y - 1))
+
+
+def test_peak_does_not_leave_what_comes_into_question(detector, scene):
+    """Climbing from the border leads to the target, which is out of question."""
+    detection = detector(view(scene.frame((83.0, 58.0))), BOX)
+    near = detector.near(detection, (83.0, 58.0), lambda places: places[..., 0] < 81.3)
+    assert near.center[0] < 81.3 and near.center[1] == pytest.approx(58, abs=3)
+    assert near.peak.value < detection.peak.value
+
+
 def test_at_least_the_next_points_of_the_grid_are_searched(make_detector, ridged):
     """A target of less than a point of the grid."""
     config = TrackerConfig(features=SMALL.features, learning=SMALL.learning,

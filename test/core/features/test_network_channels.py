@@ -14,6 +14,8 @@
 
 """Layers of networks as channels: where the cells lie, how they are averaged, what is refused."""
 
+import copy
+
 import array_api_compat.numpy as numpy_namespace
 import array_api_compat.torch as torch_namespace
 import numpy as np
@@ -57,6 +59,33 @@ def test_a_shift_by_a_cell_shifts_the_map(rng, random_network, architecture, kin
     assert np.abs(here[inner, inner] - there[inner, inner]).max() > 0.1 * np.abs(here).max()
     np.testing.assert_allclose(there[inner, inner], here[7:9, 7:9],
                                atol=1e-4 * np.abs(here).max())
+
+
+@pytest.mark.parametrize('architecture, kind, layer, cell', NETWORKS)
+def test_several_are_answered_together_as_each_alone(rng, random_network, architecture, kind,
+                                                     layer, cell):
+    run = NetworkChannels(random_network(architecture), kind, [(layer, cell)], 6 * cell, NUMPY)
+    several = [inputs(rng, kind, count, 6 * cell) for count in (1, 3, 2)]
+    for given, told in zip(several, run.together(several), strict=True):
+        alone = run(given)
+        assert told.keys() == alone.keys()
+        np.testing.assert_allclose(told[layer, cell], alone[layer, cell],
+                                   atol=1e-5 * np.abs(alone[layer, cell]).max())
+    np.testing.assert_array_equal(run.together(several[:1])[0][layer, cell],
+                                  run(several[0])[layer, cell])
+
+
+def test_only_those_who_give_the_same_are_asked_together(random_network):
+    network = random_network(ThermalNet)
+
+    def make(network=network, requests=(('features', 4),), size=80):
+        return NetworkChannels(network, 'appearance', requests, size, NUMPY).whom
+    others = [make(random_network(ThermalNet)), make(requests=[('features', 8)]), make(size=96)]
+    assert make() == make() and make() not in others
+    # A copy asks the network that was copied with it.
+    first, second = copy.deepcopy([NetworkChannels(network, 'appearance', [('features', 4)], 80,
+                                                   NUMPY) for _ in range(2)])
+    assert first.whom == second.whom != make()
 
 
 def position_network(architecture, random_network):

@@ -21,10 +21,11 @@ import pytest
 
 from lmsco_ros.core.config import IntensityConfig
 from lmsco_ros.core.errors import ImageError
-from lmsco_ros.core.imaging.gain import AutomaticGain, IntensityRange
+from lmsco_ros.core.imaging.gain import AutomaticGain, IntensityRange, survey
 from lmsco_ros.core.imaging.pixels import measured, without_dead_pixels
 from lmsco_ros.core.imaging.sampled import credible_values, percentiles, take_probe
-from lmsco_ros.core.imaging.scene_change import same_picture, SceneChange, SceneMonitor
+from lmsco_ros.core.imaging.scene_change import (
+    same_picture, scene_pattern, SceneChange, SceneMonitor)
 
 SHAPE = (120, 160)
 
@@ -36,6 +37,16 @@ def scene(seed=0, shape=SHAPE, low=7000.0, span=600.0, shift=0):
     ground = (ground - ground.min()) / np.ptp(ground)
     noise = np.random.default_rng((seed, shift)).normal(0, 0.005, shape)
     return low + span * (ground[:, shift:shift + shape[1]] + noise)
+
+
+def examined(gain, image):
+    """Return the condition of a frame."""
+    return gain.examine(survey(image, IntensityConfig()))
+
+
+def observed(monitor, image, low, high):
+    """Return what has changed in a frame of which every pixel is looked at."""
+    return monitor.observe(scene_pattern(image, low, high))
 
 
 def as_tuple(intensity):
@@ -90,7 +101,7 @@ def test_polarity_follows_every_switch_under_motion_gain_and_offset(frames):
         place += int(np.clip(target - place, -3, 3))
         image = gain * scene(shift=place) + offset
         image = (-image if inverted else image).astype(np.float32)
-        change = tracker.observe(image, *np.percentile(image, (1, 99)))
+        change = observed(tracker, image, *np.percentile(image, (1, 99)))
         assert change == SceneChange(switched=inverted != before)
         assert tracker.inverted == inverted
         before = inverted
@@ -98,19 +109,19 @@ def test_polarity_follows_every_switch_under_motion_gain_and_offset(frames):
 
 def test_flat_frames_and_other_scenes_switch_nothing():
     tracker = SceneMonitor()
-    assert tracker.observe(scene().astype(np.float32), 7000, 7600) == SceneChange()
-    assert tracker.observe(np.full(SHAPE, 7000, np.float32), 7000, 7001) == SceneChange()
+    assert observed(tracker, scene().astype(np.float32), 7000, 7600) == SceneChange()
+    assert observed(tracker, np.full(SHAPE, 7000, np.float32), 7000, 7001) == SceneChange()
     for seed in range(1, 6):
-        assert not tracker.observe(scene(seed).astype(np.float32), 7000, 7600).switched
+        assert not observed(tracker, scene(seed).astype(np.float32), 7000, 7600).switched
     # The flat frame was not taken as the scene to compare with.
-    tracker.observe(np.full(SHAPE, 7000, np.float32), 7000, 7001)
-    assert tracker.observe((14600 - scene(5)).astype(np.float32), 7000, 7600).switched
+    observed(tracker, np.full(SHAPE, 7000, np.float32), 7000, 7001)
+    assert observed(tracker, (14600 - scene(5)).astype(np.float32), 7000, 7600).switched
 
 
 def test_range_of_another_view_is_adopted_at_once():
     gain = AutomaticGain(IntensityConfig(smoothing=0.01, jump=1.0))
-    before = gain.examine(scene(0).astype(np.float32))
-    after = gain.examine(scene(3, low=7100.0).astype(np.float32))
+    before = examined(gain, scene(0).astype(np.float32))
+    after = examined(gain, scene(3, low=7100.0).astype(np.float32))
     alone = AutomaticGain(IntensityConfig()).observe(scene(3, low=7100.0).astype(np.float32))
     assert (before.cut, after.cut) == (False, True)
     assert after.intensity == alone
@@ -119,7 +130,7 @@ def test_range_of_another_view_is_adopted_at_once():
 def test_cut_to_another_scene_is_seen_once():
     tracker = SceneMonitor()
     images = [scene(seed).astype(np.float32) for seed in (0, 0, 3, 3, 3)]
-    changes = [tracker.observe(image, *np.percentile(image, (1, 99))) for image in images]
+    changes = [observed(tracker, image, *np.percentile(image, (1, 99))) for image in images]
     assert [change.cut for change in changes] == [False, False, True, False, False]
 
 
@@ -130,7 +141,8 @@ def test_the_working_picture_does_not_notice_the_polarity(low_share, high_share)
     for frame in range(6):
         image = scene(shift=frame).astype(np.float32)
         camera = 14600 - image if frame in (2, 3, 4) else image
-        one, two = plain.examine(image), other.examine(camera)
+        one, two = (gain.examine(survey(seen, config))
+                    for gain, seen in ((plain, image), (other, camera)))
         assert two.inverted == (frame in (2, 3, 4)) and not one.inverted
         if frame < 2:
             np.testing.assert_allclose(as_tuple(one.intensity), as_tuple(two.intensity))
@@ -148,17 +160,17 @@ def test_a_turned_range_exchanges_warm_and_cold():
 def test_frozen_frames_are_reported():
     gain = AutomaticGain(IntensityConfig())
     images = [scene(shift=shift).astype(np.uint16) for shift in (0, 0, 1, 1, 2)]
-    closed = [gain.examine(image).shutter_closed for image in images]
+    closed = [examined(gain, image).shutter_closed for image in images]
     assert closed == [False, True, False, True, False]
 
 
 def test_a_frame_without_a_value_is_forgotten():
     gain = AutomaticGain(IntensityConfig())
     image = scene().astype(np.float32)
-    before = gain.examine(image)
+    before = examined(gain, image)
     with pytest.raises(ImageError):
-        gain.examine(np.full(SHAPE, np.nan, np.float32))
-    after = gain.examine(image)
+        examined(gain, np.full(SHAPE, np.nan, np.float32))
+    after = examined(gain, image)
     assert after.shutter_closed and not after.inverted
     assert as_tuple(after.intensity) == pytest.approx(as_tuple(before.intensity))
 

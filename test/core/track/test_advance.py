@@ -26,9 +26,11 @@ from lmsco_ros.core.config import LearningConfig, PresenceConfig, ScaleConfig
 from lmsco_ros.core.detection.detector import Detection
 from lmsco_ros.core.detection.scale import ScaleEstimator
 from lmsco_ros.core.fourier.localization import Peak
-from lmsco_ros.core.imaging.gain import FrameCondition, IntensityRange
+from lmsco_ros.core.imaging.gain import FrameCondition, FrameSurvey, IntensityRange
 from lmsco_ros.core.imaging.view import FrameView
+from lmsco_ros.core.networks.together import at_once
 from lmsco_ros.core.presence.evidence import Assessment, Evidence, Verdict
+from lmsco_ros.core.presence.neighbors import Neighbors
 from lmsco_ros.core.presence.observer import Outlook, Sighting
 from lmsco_ros.core.track import Track
 from lmsco_ros.core.weights.loading import Networks
@@ -61,6 +63,22 @@ def sighting(center, presence, peak=3.0, box=START):
 HERE, THERE = sighting((52, 36), 2.5), sighting((20, 60), -1.5)
 
 
+class Seen:
+    """What a look returns that asks nobody; any number of times."""
+
+    def __init__(self, sighting):
+        self._sighting = sighting
+
+    def __iter__(self):
+        return self._sighting
+        yield
+
+
+def advance(track, *arguments):
+    """Return the result of a frame of one target alone."""
+    return at_once(track.advance(*arguments))
+
+
 @pytest.fixture
 def parts(monkeypatch):
     """Replace all that a track is made of; attributes are the parts, and calls are in order."""
@@ -75,7 +93,7 @@ def parts(monkeypatch):
     parts.detector.return_value = sighting(START.center, 4.0, peak=2.0).detection
     parts.monitor.believable.return_value = True
     parts.monitor.judge.return_value = BELIEVED
-    parts.observer.look.return_value, parts.redetection.return_value = HERE, THERE
+    parts.observer.look.return_value, parts.redetection.return_value = Seen(HERE), THERE
     parts.prediction.expected.return_value, parts.prediction.misses = AHEAD, 0
     parts.scale.search_factors = (0.9, 1.0)
     parts.scale.found_factor.return_value = parts.scale.estimate.return_value = 1.0
@@ -85,14 +103,14 @@ def parts(monkeypatch):
     return parts
 
 
-def image():
-    """Return a frame."""
-    return np.zeros((100, 120), np.uint8)
+def frame():
+    """Return a frame, of which nothing but its pixels is looked at here."""
+    return FrameSurvey(np.zeros((100, 120), np.uint8), np.zeros((10, 12)), None, RANGE, RANGE)
 
 
 def started(parts, config=CONFIG, networks=Networks()):
     """Return a track whose first frame is forgotten by its parts."""
-    track = Track(config, 'backend', networks, image(), START)
+    track = Track(config, 'backend', networks, frame(), START)
     parts.reset_mock()
     parts.gain.examine.return_value = PLAIN
     return track
@@ -110,9 +128,9 @@ def names(parts):
 
 
 def test_plain_frame_is_seen_judged_followed_and_learned_in_this_order(parts, track):
-    track.advance(image())
+    advance(track, frame())
     parts.reset_mock()
-    track.advance(image())
+    advance(track, frame())
     assert names(parts) == [
         'motion.predict', 'gain.examine', 'prediction.expected', 'observer.look',
         'monitor.believable', 'monitor.judge', 'scale.found_factor', 'scale.estimate',
@@ -122,31 +140,45 @@ def test_plain_frame_is_seen_judged_followed_and_learned_in_this_order(parts, tr
 
 
 def test_frame_is_examined_and_seen_in_its_range(parts, track):
-    shown = image()
-    track.advance(shown)
+    shown = frame()
+    advance(track, shown)
     parts.gain.examine.assert_called_once_with(shown)
     outlook, = parts.observer.look.call_args.args[:1]
-    assert outlook.view.image is shown and outlook.view.intensity is RANGE
+    assert outlook.view.image is shown.image and outlook.view.intensity is RANGE
 
 
 def test_target_is_looked_for_where_it_is_expected_at_the_searched_scales(parts, track):
-    shown = image()
-    track.advance(shown)
-    view = FrameView(shown, RANGE)
+    shown = frame()
+    advance(track, shown)
+    view = FrameView(shown.image, RANGE)
     parts.observer.look.assert_called_once_with(
         Outlook(view, START, AHEAD), (0.9, 1.0), None)
     assert parts.prediction.expected.call_args_list[0] == call(START, (120, 100))
 
 
+def test_others_are_told_with_where_the_target_goes_itself(parts, track):
+    parts.prediction.velocity = (3.0, -2.0)
+    assert track.heading == (53, 33)
+    advance(track, frame(), None, [(70, 40), (90, 20)])
+    assert parts.observer.look.call_args.args[0].neighbors == Neighbors(
+        (53, 33), ((70, 40), (90, 20)))
+
+
+def test_nobody_is_where_he_was_expected_after_a_cut(parts, track):
+    parts.gain.examine.return_value = CUT
+    advance(track, frame(), None, [(70, 40)])
+    assert parts.observer.look.call_args.args[0].neighbors is None
+
+
 def test_frame_is_judged_once_by_what_was_seen(parts, track):
-    result = track.advance(image())
+    result = advance(track, frame())
     parts.monitor.judge.assert_called_once_with(HERE.assessment)
     assert (result.score, result.state) == (BELIEVED.score, BELIEVED.state)
     assert result is track.result
 
 
 def test_believable_sighting_needs_no_search(parts, track):
-    track.advance(image())
+    advance(track, frame())
     parts.monitor.believable.assert_called_once_with(HERE.assessment)
     parts.redetection.assert_not_called()
 
@@ -154,10 +186,10 @@ def test_believable_sighting_needs_no_search(parts, track):
 def test_what_is_not_believable_is_searched_elsewhere_and_that_is_judged(parts, track):
     parts.monitor.believable.return_value = False
     parts.prediction.misses = 7
-    shown = image()
-    result = track.advance(shown)
+    shown = frame()
+    result = advance(track, shown)
     assert parts.redetection.call_args_list == [call(
-        Outlook(FrameView(shown, RANGE), START, AHEAD), HERE, 7, after_shutter=False)]
+        Outlook(FrameView(shown.image, RANGE), START, AHEAD), HERE, 7, after_shutter=False)]
     parts.monitor.judge.assert_called_once_with(THERE.assessment)
     parts.detector.remember.assert_called_once_with(THERE.detection)
     assert result.box.center == pytest.approx(THERE.detection.center)
@@ -167,7 +199,7 @@ def test_closed_shutter_shows_nothing_new(parts, track):
     before = track.result
     parts.gain.examine.return_value = SHUT
     for _ in range(3):
-        assert track.advance(image()) is before
+        assert advance(track, frame()) is before
     assert set(names(parts)) == {'motion.predict', 'gain.examine'}
 
 
@@ -175,7 +207,7 @@ def test_first_frame_after_the_shutter_is_searched_whatever_is_seen(parts, track
     conditions = [SHUT, PLAIN, PLAIN]
     parts.gain.examine.side_effect = conditions
     for _ in conditions:
-        track.advance(image())
+        advance(track, frame())
     parts.redetection.assert_called_once()
     assert parts.redetection.call_args.kwargs == {'after_shutter': True}
 
@@ -183,7 +215,7 @@ def test_first_frame_after_the_shutter_is_searched_whatever_is_seen(parts, track
 def test_frames_of_a_closed_shutter_are_not_counted(parts, track):
     parts.gain.examine.side_effect = [PLAIN, SHUT, PLAIN, PLAIN]
     for _ in range(4):
-        track.advance(image())
+        advance(track, frame())
     # The filter is trained in the second frame that shows something.
     assert [made for made in names(parts) if made in ('detector.train', 'observer.look')] == [
         'observer.look', 'observer.look', 'detector.train', 'observer.look']
@@ -191,7 +223,7 @@ def test_frames_of_a_closed_shutter_are_not_counted(parts, track):
 
 def test_after_a_cut_nothing_is_expected_before_the_target_is_looked_for(parts, track):
     parts.gain.examine.return_value = CUT
-    track.advance(image())
+    advance(track, frame())
     assert names(parts)[1:9] == [
         'gain.examine', 'monitor.note_cut', 'prediction.stop', 'redetection.restart',
         'observer.forget', 'motion.forget_place', 'prediction.expected', 'observer.look']
@@ -199,7 +231,7 @@ def test_after_a_cut_nothing_is_expected_before_the_target_is_looked_for(parts, 
 
 
 def test_frame_without_a_cut_forgets_nothing(parts, track):
-    track.advance(image())
+    advance(track, frame())
     for unwanted in ('monitor.note_cut', 'prediction.stop', 'observer.forget',
                      'motion.forget_place'):
         assert unwanted not in names(parts)
@@ -207,39 +239,39 @@ def test_frame_without_a_cut_forgets_nothing(parts, track):
 
 def test_comparison_of_the_frame_before_stands_in_frames_that_train(parts, track):
     for _ in range(4):
-        track.advance(image())
+        advance(track, frame())
     assert [made.args[2] for made in parts.observer.look.call_args_list] == [None, 2.5, None, 2.5]
 
 
 def test_carried_comparison_is_that_of_what_was_judged(parts, track):
     parts.monitor.believable.return_value = False
-    track.advance(image())
-    track.advance(image())
+    advance(track, frame())
+    advance(track, frame())
     assert [made.args[2] for made in parts.observer.look.call_args_list] == [None, -1.5]
 
 
 def test_comparison_is_made_in_every_frame_where_every_frame_trains(parts):
     track = started(parts, replace(CONFIG, learning=LearningConfig(update_interval=1)))
     for _ in range(3):
-        track.advance(image())
+        advance(track, frame())
     assert [made.args[2] for made in parts.observer.look.call_args_list] == [None] * 3
 
 
 @pytest.mark.parametrize('verdict', [BELIEVED, DOUBTED], ids=['certain', 'doubted'])
 def test_believed_target_is_followed(parts, track, verdict):
     parts.monitor.judge.return_value = verdict
-    result = track.advance(image())
+    result = advance(track, frame())
     parts.prediction.seen.assert_called_once_with(pytest.approx((52, 36)))
     parts.prediction.missed.assert_not_called()
     parts.redetection.restart.assert_called_once_with()
     assert result.box.center == pytest.approx((52, 36)) and result.box.size == START.size
-    track.advance(image())
+    advance(track, frame())
     assert parts.observer.look.call_args.args[0].last == result.box
 
 
 def test_target_that_is_not_believed_stays_where_it_was_and_counts_as_missed(parts, track):
     parts.monitor.judge.return_value = MISSED
-    result = track.advance(image())
+    result = advance(track, frame())
     assert result.box == START and result.state is MISSED.state
     parts.prediction.missed.assert_called_once_with()
     for unwanted in ('prediction.seen', 'redetection.restart', 'observer.keep',
@@ -249,30 +281,30 @@ def test_target_that_is_not_believed_stays_where_it_was_and_counts_as_missed(par
 
 
 def test_motion_goes_by_the_times_of_the_frames(parts):
-    track = Track(CONFIG, 'backend', Networks(), image(), START, 5.0)
+    track = Track(CONFIG, 'backend', Networks(), frame(), START, 5.0)
     parts.gain.examine.side_effect = [PLAIN, SHUT, PLAIN]
-    results = [track.advance(image(), time) for time in (5.1, 5.3, 5.4)]
+    results = [advance(track, frame(), time) for time in (5.1, 5.3, 5.4)]
     assert [made.args[0] for made in parts.motion.predict.call_args_list] == pytest.approx(
         [3.0, 6.0, 3.0])
     assert results[-1].velocity == (60.0, -30.0)
 
 
 def test_frames_without_times_are_one_step_each(parts, track):
-    assert track.advance(image()).velocity == (2.0, -1.0)
+    assert advance(track, frame()).velocity == (2.0, -1.0)
     parts.motion.predict.assert_called_once_with(1.0)
 
 
 def test_wrong_time_changes_nothing(parts, track):
     with pytest.raises(TimeError, match='initialized on a frame with none'):
-        track.advance(image(), 5.0)
+        advance(track, frame(), 5.0)
     assert names(parts) == []
-    track.advance(image())
+    advance(track, frame())
 
 
 def test_motion_takes_what_is_told_with_how_exactly_it_was_seen(parts):
     track = started(parts, replace(CONFIG, scale=ScaleConfig(tolerance=1.0)))
     parts.scale.estimate.return_value = 1.05
-    track.advance(image())
+    advance(track, frame())
     (box, covariance), = (made.args for made in parts.motion.measure.call_args_list)
     assert box.size == pytest.approx(START.size) and box.center == pytest.approx((52, 36))
     assert covariance == (HERE.detection, box)
@@ -283,7 +315,7 @@ def test_motion_takes_what_is_told_with_how_exactly_it_was_seen(parts):
     (START.moved_to((118, -20)), BoundingBox(108, 0, 12, 5))])
 def test_motion_is_told_with_the_box_in_the_image(parts, track, moved, told):
     parts.motion.box = moved
-    result = track.advance(image())
+    result = advance(track, frame())
     assert result.predicted_box.as_tuple() == pytest.approx(told.as_tuple())
     assert result.covariance is parts.motion.covariance
 
@@ -294,19 +326,19 @@ def test_frame_is_kept_where_the_target_is_certain_and_distractors_are_asked_for
         parts, verdict, distractors, kept):
     track = started(parts, replace(CONFIG, presence=PresenceConfig(distractors=distractors)))
     parts.monitor.judge.return_value = verdict
-    shown = image()
-    result = track.advance(shown)
-    expected = [call(FrameView(shown, RANGE), result.box)] if kept else []
+    shown = frame()
+    result = advance(track, shown)
+    expected = [call(FrameView(shown.image, RANGE), result.box)] if kept else []
     assert parts.observer.keep.call_args_list == expected
 
 
 def test_size_is_found_by_the_search_and_then_by_the_estimator(parts, track):
     parts.scale.found_factor.return_value, parts.scale.estimate.return_value = 1.2, 1.5
-    shown = image()
-    result = track.advance(shown)
+    shown = frame()
+    result = advance(track, shown)
     assert parts.scale.found_factor.call_args.args[0].tolist() == [3.0, 1.0]
     view, moved = parts.scale.estimate.call_args.args
-    assert view.image is shown
+    assert view.image is shown.image
     assert moved.center == pytest.approx((52, 36)) and moved.size == pytest.approx((24, 12))
     assert result.box.center == pytest.approx((52, 36))
     assert result.box.size == pytest.approx((36, 18))
@@ -315,43 +347,43 @@ def test_size_is_found_by_the_search_and_then_by_the_estimator(parts, track):
 @pytest.mark.parametrize('found, estimated', [(1e4, 1.0), (1.0, 1e4)])
 def test_size_remains_one_that_can_be_tracked(parts, track, found, estimated):
     parts.scale.found_factor.return_value, parts.scale.estimate.return_value = found, estimated
-    track.advance(image())
-    track.advance(image())
+    advance(track, frame())
+    advance(track, frame())
     last = parts.observer.look.call_args.args[0].last
     assert max(last.size) == pytest.approx(2 * np.hypot(120, 100))
     assert max(parts.scale.estimate.call_args.args[1].size) < 320 * found
 
 
 def test_size_is_that_of_the_sighting(parts, track):
-    parts.observer.look.return_value = sighting((52, 36), 2.5, box=START.scaled(2))
-    assert track.advance(image()).box.size == (40, 20)
+    parts.observer.look.return_value = Seen(sighting((52, 36), 2.5, box=START.scaled(2)))
+    assert advance(track, frame()).box.size == (40, 20)
 
 
 def test_target_beyond_the_border_is_followed_to_the_border(parts, track):
-    parts.observer.look.return_value = sighting((130, 36), 2.5)
-    track.advance(image())
+    parts.observer.look.return_value = Seen(sighting((130, 36), 2.5))
+    advance(track, frame())
     parts.prediction.seen.assert_called_once_with(pytest.approx((120, 36)))
 
 
 def test_filter_learns_what_was_seen_and_trains_every_other_frame(parts, track):
     for _ in range(4):
-        track.advance(image())
+        advance(track, frame())
     assert parts.detector.remember.call_args_list == 4 * [call(HERE.detection)]
     assert parts.detector.train.call_args_list == 2 * [call()]
     assert parts.scale.learn.call_count == 2
 
 
 def test_size_is_learned_at_the_new_place(parts, track):
-    track.advance(image())
-    shown = image()
-    result = track.advance(shown)
-    parts.scale.learn.assert_called_once_with(FrameView(shown, RANGE), result.box)
+    advance(track, frame())
+    shown = frame()
+    result = advance(track, shown)
+    parts.scale.learn.assert_called_once_with(FrameView(shown.image, RANGE), result.box)
 
 
 def test_doubted_target_is_not_learned(parts, track):
     parts.monitor.judge.return_value = DOUBTED
-    track.advance(image())
-    track.advance(image())
+    advance(track, frame())
+    advance(track, frame())
     for unwanted in ('detector.remember', 'detector.train', 'scale.learn'):
         assert unwanted not in names(parts)
 
@@ -359,15 +391,15 @@ def test_doubted_target_is_not_learned(parts, track):
 @pytest.mark.parametrize('verdict', [BELIEVED, MISSED], ids=['believed', 'missed'])
 def test_place_of_the_next_frame_is_watched_at_the_end(parts, track, verdict):
     parts.monitor.judge.return_value = verdict
-    shown = image()
-    result = track.advance(shown)
+    shown = frame()
+    result = advance(track, shown)
     assert names(parts)[-2:] == ['prediction.expected', 'detector.watch']
     assert parts.prediction.expected.call_args == call(result.box, (120, 100))
-    parts.detector.watch.assert_called_once_with(FrameView(shown, RANGE), AHEAD)
+    parts.detector.watch.assert_called_once_with(FrameView(shown.image, RANGE), AHEAD)
 
 
 def test_map_is_the_score_in_units_of_the_first_frame(parts, track):
-    result = track.advance(image())
+    result = advance(track, frame())
     assert result.search_region == REGION
     assert result.confidence_map.dtype == np.float32
     assert result.confidence_map[2, 2] == 0 and result.confidence_map.max() == 3.0 * 24 / 2.0
@@ -376,23 +408,23 @@ def test_map_is_the_score_in_units_of_the_first_frame(parts, track):
 def test_told_size_leaves_out_what_cannot_be_measured(parts):
     track = started(parts, replace(CONFIG, scale=ScaleConfig(tolerance=1.0)))
     parts.scale.estimate.return_value = 1.05
-    assert track.advance(image()).box.size == pytest.approx(START.size)
+    assert advance(track, frame()).box.size == pytest.approx(START.size)
     # The tracker goes on with the size that was measured.
-    track.advance(image())
+    advance(track, frame())
     assert parts.observer.look.call_args.args[0].last.size == pytest.approx((21, 10.5))
 
 
 def test_told_box_is_the_visible_part(parts, track):
-    parts.observer.look.return_value = sighting((119, 36), 2.5)
-    assert track.advance(image()).box.as_tuple() == pytest.approx((109, 31, 11, 10))
+    parts.observer.look.return_value = Seen(sighting((119, 36), 2.5))
+    assert advance(track, frame()).box.as_tuple() == pytest.approx((109, 31, 11, 10))
 
 
 def test_parts_are_made_of_the_first_frame(parts, monkeypatch):
     made = {name: getattr(track_module, kind) for name, kind in CLASSES.items()}
-    make_scale, shown = track_module.make_scale_estimator, image()
+    make_scale, shown = track_module.make_scale_estimator, frame()
     networks = Networks(comparison='network')
     track = Track(CONFIG, 'backend', networks, shown, START)
-    view = FrameView(shown, FIRST_RANGE)
+    view = FrameView(shown.image, FIRST_RANGE)
     made['gain'].assert_called_once_with(CONFIG.intensity)
     made['detector'].assert_called_once_with(CONFIG, 'backend', networks, view, START)
     assert parts.detector.call_args_list == [call(view, START)]
@@ -423,5 +455,5 @@ def test_nothing_is_compared_without_a_network(parts):
 
 def test_box_is_checked_against_the_image_first(parts):
     with pytest.raises(BoxError, match='image of 120 x 100 pixels'):
-        Track(CONFIG, 'backend', Networks(), image(), BoundingBox(0, 0, 10, 110))
+        Track(CONFIG, 'backend', Networks(), frame(), BoundingBox(0, 0, 10, 110))
     assert names(parts) == []

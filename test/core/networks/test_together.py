@@ -1,0 +1,70 @@
+# Copyright 2026 lmsco_ros contributors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Works whose asks are answered together."""
+
+from hypothesis import given, strategies as st
+import pytest
+
+from lmsco_ros.core.networks.together import Ask, at_once, side_by_side
+
+
+class Doubler:
+    """Answers numbers by twice as much, and keeps what was asked together."""
+
+    def __init__(self):
+        self.asked = []
+
+    def __call__(self, subjects):
+        self.asked.append(list(subjects))
+        return [2 * subject for subject in subjects]
+
+
+def work(doubler, numbers, whom='doubler'):
+    """Ask about numbers, one after the other; return the answers."""
+    told = []
+    for number in numbers:
+        told.append((yield Ask(whom, doubler, number)))
+    return told
+
+
+@given(st.lists(st.lists(st.integers(), max_size=4), max_size=5))
+def test_everybody_gets_what_it_would_get_alone(tasks):
+    doubler = Doubler()
+    results = side_by_side({index: work(doubler, numbers) for index, numbers in enumerate(tasks)})
+    assert results == {index: [2 * number for number in numbers]
+                       for index, numbers in enumerate(tasks)}
+    assert list(results) == list(range(len(tasks)))
+    # The first asks meet, then the second, and so on.
+    assert doubler.asked == [
+        [numbers[turn] for numbers in tasks if len(numbers) > turn]
+        for turn in range(max(map(len, tasks), default=0))]
+
+
+def test_asks_of_others_are_not_mixed():
+    one, other = Doubler(), Doubler()
+    side_by_side({1: work(one, [1], 'one'), 2: work(other, [2], 'other'),
+                  3: work(one, [3], 'one')})
+    assert (one.asked, other.asked) == ([[1, 3]], [[2]])
+
+
+def test_work_alone_is_answered_at_once():
+    doubler = Doubler()
+    assert at_once(work(doubler, [1, 2])) == [2, 4] and doubler.asked == [[1], [2]]
+    assert at_once(work(doubler, [])) == []
+
+
+def test_too_few_answers_are_an_error():
+    with pytest.raises(ValueError):
+        side_by_side({1: work(lambda subjects: [], [1])})
