@@ -34,7 +34,7 @@ python benchmarks/node_overhead.py [--frames N] [--repetitions N]
 from __future__ import annotations
 
 import argparse
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 import contextlib
 import os
 from pathlib import Path
@@ -69,15 +69,28 @@ WARM_UP = 30
 class InstantTracker:
     """Answers at once: what remains is the node."""
 
-    def initialize(self, image: np.ndarray, box: BoundingBox, time: float) -> TrackResult:
-        """Return the box."""
-        self._box = box
-        return self.update(image, time)
+    def __init__(self) -> None:
+        self.results: dict[int, TrackResult] = {}
 
-    def update(self, image: np.ndarray, time: float) -> TrackResult:
+    def initialize(self, image: np.ndarray, box: BoundingBox, time: float,
+                   in_place_of: Collection[int] = ()) -> int:
+        """Take the box for the only target."""
+        self.results = {1: TrackResult(box, 1.0, TrackState.TRACKING,
+                                       np.zeros((2, 2), np.float32), box)}
+        return 1
+
+    def update(self, image: np.ndarray, time: float,
+               only: Collection[int] | None = None) -> dict[int, TrackResult]:
         """Return the box again."""
-        return TrackResult(self._box, 1.0, TrackState.TRACKING,
-                           np.zeros((2, 2), np.float32), self._box)
+        return self.results
+
+    def drop(self, number: int) -> None:
+        """Forget the only target."""
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget the target."""
+        self.results = {}
 
 
 class Echo(Node):

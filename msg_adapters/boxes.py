@@ -21,13 +21,14 @@ A box is the tuple (x, y, width, height) in pixels, (x, y) its top-left corner; 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 import importlib
 import importlib.util
 import math
 from typing import Any, NamedTuple
 
-from geometry_msgs.msg import Point32, Polygon, PolygonStamped
+from geometry_msgs.msg import (
+    Point32, Polygon, PolygonInstance, PolygonInstanceStamped, PolygonStamped)
 import numpy as np
 from sensor_msgs.msg import RegionOfInterest
 from std_msgs.msg import Header
@@ -102,6 +103,14 @@ def polygon_from_box(box: Sequence[float], header: Header | None = None) -> Poly
     return PolygonStamped(header=header or Header(), polygon=Polygon(points=corners))
 
 
+def instance_from_box(box: Sequence[float], track_id: int,
+                      header: Header | None = None) -> PolygonInstanceStamped:
+    """Return the corners of the box of a target, as `polygon_from_box` does, with its number."""
+    corners = polygon_from_box(box, header)
+    return PolygonInstanceStamped(header=corners.header, polygon=PolygonInstance(
+        polygon=corners.polygon, id=track_id))
+
+
 def corners_of_box(box: Sequence[float]) -> list[tuple[float, float]]:
     """
     Return the four corners (x, y), clockwise (as seen) from the top left.
@@ -121,14 +130,13 @@ def detections_available() -> bool:
     return importlib.util.find_spec('vision_msgs') is not None
 
 
-def detections_from_box(box: Sequence[float] | None, *, track_id: str = '', score: float = 1.0,
-                        class_id: str = 'target', header: Header | None = None) -> Any:
+class Tracked(NamedTuple):
     """
-    Return a `vision_msgs/Detection2DArray` with one detection, or none without a box.
+    A box that is followed.
 
-    Parameters
+    Attributes
     ----------
-    box : (x, y, width, height) or None
+    box : (x, y, width, height)
         In pixels.
     track_id : str
         Identity of the target across frames.
@@ -136,6 +144,23 @@ def detections_from_box(box: Sequence[float] | None, *, track_id: str = '', scor
         Trust in the box, in [0, 1].
     class_id : str
         What kind of object it is, if anybody knows.
+
+    """
+
+    box: Sequence[float]
+    track_id: str = ''
+    score: float = 1.0
+    class_id: str = 'target'
+
+
+def detections_from_boxes(boxes: Iterable[Tracked], header: Header | None = None) -> Any:
+    """
+    Return a `vision_msgs/Detection2DArray` with a detection for each box.
+
+    Parameters
+    ----------
+    boxes : iterable of Tracked
+        Of all targets in a frame.
     header : std_msgs/Header, optional
         Stamp and frame; empty by default.
 
@@ -148,7 +173,7 @@ def detections_from_box(box: Sequence[float] | None, *, track_id: str = '', scor
     msg = importlib.import_module('vision_msgs.msg')
     header = header or Header()
     array = msg.Detection2DArray(header=header)
-    if box is not None:
+    for box, track_id, score, class_id in boxes:
         x, y, width, height = checked_box(box)
         detection = msg.Detection2D(header=header, id=track_id)
         detection.bbox.center.position.x = x + width / 2
@@ -161,9 +186,12 @@ def detections_from_box(box: Sequence[float] | None, *, track_id: str = '', scor
     return array
 
 
-def boxes_from_detections(array: Any) -> list[Box]:
+def tracked_from_detections(array: Any) -> list[Tracked]:
     """
     Return the boxes of a `vision_msgs/Detection2DArray`; rotations are ignored.
+
+    Of several hypotheses the one with the highest score counts; without any the class is empty
+    and the score 1.
 
     Raises
     ------
@@ -171,10 +199,17 @@ def boxes_from_detections(array: Any) -> list[Box]:
         When a box is empty or not finite.
 
     """
-    boxes = (detection.bbox for detection in array.detections)
-    return [checked_box((box.center.position.x - box.size_x / 2,
-                         box.center.position.y - box.size_y / 2, box.size_x, box.size_y))
-            for box in boxes]
+    return [_tracked(detection) for detection in array.detections]
+
+
+def _tracked(detection: Any) -> Tracked:
+    """Return one detection."""
+    place, box = detection.bbox.center.position, detection.bbox
+    best = max((result.hypothesis for result in detection.results),
+               key=lambda hypothesis: hypothesis.score, default=None)
+    return Tracked(
+        checked_box((place.x - box.size_x / 2, place.y - box.size_y / 2, box.size_x, box.size_y)),
+        detection.id, *(1.0, '') if best is None else (float(best.score), str(best.class_id)))
 
 
 def checked_box(box: Sequence[float]) -> Box:

@@ -92,6 +92,8 @@ class FrameStatus:
         Of the pixels under the box, in the units of the image; None without a box.
     target_celsius : Reading or None
         The same in degrees Celsius; None where that is not known.
+    start : str
+        The answer to who asked to start: accepted or refused; empty where nobody has.
 
     """
 
@@ -106,6 +108,7 @@ class FrameStatus:
     times: FrameTimes | None = None
     target: Reading | None = None
     target_celsius: Reading | None = None
+    start: str = ''
 
 
 # Prefix of the keys in the message, attribute of FrameStatus and its type.
@@ -142,7 +145,18 @@ def diagnoses_from_message(message: DiagnosticArray) -> list[Diagnosis]:
 
 def message_from_status(status: FrameStatus, name: str,
                         header: Header | None = None) -> DiagnosticArray:
-    """Return the status of one frame, under the name of the node that says it."""
+    """Return the status of a frame with one target, under the name of the node that says it."""
+    return message_from_statuses([status], name, header)
+
+
+def message_from_statuses(statuses: Iterable[FrameStatus], name: str,
+                          header: Header | None = None) -> DiagnosticArray:
+    """Return the status of a frame: an entry for each target, the selected one first."""
+    return message_from_diagnoses([_diagnosis(status, name) for status in statuses], header)
+
+
+def _diagnosis(status: FrameStatus, name: str) -> Diagnosis:
+    """Return the entry of one target."""
     values = {
         'state': status.state,
         'track_id': str(status.track_id),
@@ -156,34 +170,55 @@ def message_from_status(status: FrameStatus, name: str,
         if group is not None:
             values |= {prefix + key: repr(float(value))
                        for key, value in group._asdict().items()}
-    return message_from_diagnoses(
-        [Diagnosis(name, status.level, status.message, values)], header)
+    if status.start:
+        values['start'] = status.start
+    target = f'target_{status.track_id}' if status.track_id else ''
+    return Diagnosis(name, status.level, status.message, values, target)
 
 
 def status_from_message(message: DiagnosticArray) -> FrameStatus:
     """
-    Return the status of the frame that `message` speaks of.
+    Return the status of the frame that `message` speaks of: of the selected target.
 
     Raises
     ------
     StatusMessageError
-        When the message was not made by :func:`message_from_status`.
+        As :func:`statuses_from_message`.
 
     """
-    diagnoses = diagnoses_from_message(message)
+    return statuses_from_message(message)[0]
+
+
+def statuses_from_message(message: DiagnosticArray) -> list[FrameStatus]:
+    """
+    Return the status of each target in a frame, at least one.
+
+    Raises
+    ------
+    StatusMessageError
+        When the message was not made by :func:`message_from_statuses`.
+
+    """
+    if not message.status:
+        raise StatusMessageError('the message has no entry; expected one for each target')
+    return [_status(diagnosis) for diagnosis in diagnoses_from_message(message)]
+
+
+def _status(diagnosis: Diagnosis) -> FrameStatus:
+    """Return the status of one target."""
+    values = diagnosis.values
     try:
-        diagnosis, = diagnoses
-        values = diagnosis.values
         return FrameStatus(
             values['state'], int(values['track_id']),
             float(values['score']) if values['score'] else None,
             float(values['latency_ms']), float(values['tracker_ms']),
             int(values['dropped_frames']), diagnosis.level, diagnosis.message,
             times=_group(values, '', FrameTimes), target=_group(values, 'target_', Reading),
-            target_celsius=_group(values, 'target_celsius_', Reading))
+            target_celsius=_group(values, 'target_celsius_', Reading),
+            start=values.get('start', ''))
     except (KeyError, ValueError) as error:
         raise StatusMessageError(
-            f'the message is no frame status ({error}); expected one entry with state, '
+            f'the message is no frame status ({error}); expected entries with state, '
             'track_id, score, latency_ms, tracker_ms and dropped_frames') from error
 
 

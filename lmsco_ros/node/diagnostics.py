@@ -18,19 +18,21 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable
+from dataclasses import replace
 import threading
 import time
 from typing import NamedTuple
 
 import numpy as np
 
-from lmsco_ros.core.types import TrackState
+from lmsco_ros.core.types import TrackResult, TrackState
 from lmsco_ros.node.outcome import Outcome, Phase
 from msg_adapters.status import Diagnosis, FrameStatus, FrameTimes, Level, Reading
 
 # Latencies of the last ten seconds at 30 Hz.
 _WINDOW = 300
 _PERCENTILES = (50, 95, 99)
+_ACCEPTED, _REFUSED = 'accepted', 'refused'
 _LEVELS = {Phase.IDLE: Level.OK, Phase.DISABLED: Level.OK, Phase.REFUSED: Level.ERROR,
            Phase.FAILED: Level.ERROR}
 _MESSAGES = {
@@ -42,6 +44,13 @@ _MESSAGES = {
 }
 
 
+class Readings(NamedTuple):
+    """Of the pixels under a box: in the units of the image, and in degrees Celsius."""
+
+    target: Reading | None = None
+    celsius: Reading | None = None
+
+
 class Problem(NamedTuple):
     """What is wrong at the moment."""
 
@@ -49,11 +58,12 @@ class Problem(NamedTuple):
     message: str
 
 
-def frame_status(outcome: Outcome, dropped_frames: int, published: float, *,
-                 target: Reading | None = None,
-                 target_celsius: Reading | None = None) -> FrameStatus:
+def frame_statuses(outcome: Outcome, dropped_frames: int, published: float,
+                   read: Callable[[TrackResult], Readings]) -> list[FrameStatus]:
     """
-    Return what ~/status says about one frame.
+    Return what ~/status says about one frame: of each target, the selected one first.
+
+    A start that is refused has an entry of its own behind those of the targets.
 
     Parameters
     ----------
@@ -63,30 +73,51 @@ def frame_status(outcome: Outcome, dropped_frames: int, published: float, *,
         Of the worker.
     published : float
         When the box went out, on the clock of `time.monotonic`.
-    target, target_celsius : Reading or None
-        Of the pixels under the box.
+    read : callable
+        Returns the readings of the pixels under the box of a result.
 
     """
-    result, phase = outcome.result, outcome.phase
-    if result is None:
-        state, level = phase.value, _LEVELS[phase]
-        message = outcome.error or _MESSAGES[phase]
-    else:
-        state, message = result.state.value, _MESSAGES[result.state]
-        level = Level.OK if result.state is TrackState.TRACKING else Level.WARN
     stations = (outcome.frame.received, outcome.started, outcome.finished, published)
     since_1970 = time.time() - time.monotonic()
-    return FrameStatus(
-        state, outcome.track_id, None if result is None else float(result.score),
-        (published - outcome.frame.received) * 1e3, (outcome.finished - outcome.started) * 1e3,
-        dropped_frames, level, message, FrameTimes(*(since_1970 + at for at in stations)),
-        target, target_celsius)
+    phase, start = outcome.phase, outcome.start
+    frame = FrameStatus(
+        phase.value, outcome.track_id, None, (published - outcome.frame.received) * 1e3,
+        (outcome.finished - outcome.started) * 1e3, dropped_frames,
+        times=FrameTimes(*(since_1970 + at for at in stations)))
+    selected_first = sorted(outcome.results, key=lambda number: number != outcome.track_id)
+    statuses = [_target_status(frame, outcome, number, read) for number in selected_first]
+    if start is not None and not start.accepted:
+        return [*statuses, replace(
+            frame, state=phase.value if not statuses else Phase.REFUSED.value,
+            level=Level.ERROR, message=start.reason, start=_REFUSED)]
+    return statuses or [replace(
+        frame, level=_LEVELS[phase], message=outcome.error or _MESSAGES[phase])]
 
 
-def refused_status(reason: str, track_id: int, dropped_frames: int) -> FrameStatus:
-    """Return what ~/status says about a message that cannot be used."""
+def _target_status(frame: FrameStatus, outcome: Outcome, number: int,
+                   read: Callable[[TrackResult], Readings]) -> FrameStatus:
+    """Return the status of one target in a frame."""
+    result, start = outcome.results[number], outcome.start
+    message = _MESSAGES[result.state]
+    if number in outcome.dropped:
+        message = 'lost for too long: the target is dropped (drop_after)'
+    started = start is not None and start.number == number
+    if start is not None and started:
+        places = ', '.join(map(str, start.replaced))
+        message += '; the start is accepted' + (f' in place of target {places}' if places else '')
+    readings = Readings() if result.state is TrackState.LOST else read(result)
+    return replace(
+        frame, state=result.state.value, track_id=number, score=float(result.score),
+        level=Level.OK if result.state is TrackState.TRACKING else Level.WARN, message=message,
+        target=readings.target, target_celsius=readings.celsius,
+        start=_ACCEPTED if started else '')
+
+
+def refused_status(reason: str, track_id: int, dropped_frames: int, *,
+                   start: bool = False) -> FrameStatus:
+    """Return what ~/status says about a message, of a start or not, that cannot be used."""
     return FrameStatus(Phase.REFUSED.value, track_id, None, 0.0, 0.0, dropped_frames,
-                       Level.ERROR, reason)
+                       Level.ERROR, reason, start=_REFUSED if start else '')
 
 
 class HealthMonitor:
@@ -159,7 +190,7 @@ class HealthMonitor:
         """Note what became of a frame."""
         with self._lock:
             self._counts['tracked'] += outcome.phase is Phase.TRACKED
-            self._counts['refused'] += outcome.phase is Phase.REFUSED
+            self._counts['refused'] += outcome.refused
             self._counts['tracker_errors'] += outcome.phase is Phase.FAILED
             self._last_error = outcome.error or self._last_error
             self._state = (outcome.phase if outcome.result is None

@@ -16,20 +16,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection, Mapping
 import sys
+from typing import TypeVar
 
 import numpy.typing as npt
 
 from lmsco_ros.core.types import BoundingBox, TrackResult, TrackState
 from lmsco_ros.node.outcome import Tracker
 
+_Done = TypeVar('_Done')
+
 
 class FallbackTracker:
     """
     A tracker that is made anew on the processor when the GPU runs out of memory.
 
-    The new one starts on the last frame in which the target was found and goes on from there.
+    The new one starts on the last frame in which each target was found and goes on from there,
+    under the same numbers.
     It stays on the processor: memory that is short once is short again.
 
     Parameters
@@ -53,22 +57,68 @@ class FallbackTracker:
         self._make = make
         self._device = device
         self._warn = warn
-        self._found: tuple[npt.NDArray, BoundingBox, float] | None = None
+        # Where each target was seen last, and the number that the present tracker knows it by.
+        self._found: dict[int, tuple[npt.NDArray, BoundingBox, float]] = {}
+        self._numbers: dict[int, int] = {}
+        self._started = 0
         self._attempt(lambda: self._use(make(device)))
 
-    def initialize(self, image: npt.NDArray, box: BoundingBox, time: float) -> TrackResult:
-        """Start on a target in a frame that was taken at a time, in seconds."""
-        result = self._attempt(lambda: self._tracker.initialize(image, box, time)) \
-            or self._tracker.initialize(image, box, time)
-        return self._noted(image, result, time)
+    @property
+    def results(self) -> dict[int, TrackResult]:
+        """What was last said of each target, by its number."""
+        return self._outwards(self._tracker.results)
 
-    def update(self, image: npt.NDArray, time: float) -> TrackResult:
-        """Find the target in the next frame."""
-        result = self._attempt(lambda: self._tracker.update(image, time)) \
-            or self._resume(image, time)
-        return self._noted(image, result, time)
+    def initialize(self, image: npt.NDArray, box: BoundingBox, time: float,
+                   in_place_of: Collection[int] = ()) -> int:
+        """Start on a target in place of others, in a frame taken at a time; return its number."""
+        number = self._attempt(lambda: self._start(image, box, time, in_place_of))
+        if number is None:
+            self._resume()
+            number = self._start(image, box, time, in_place_of)
+        self._started += 1
+        self._numbers[self._started] = number
+        for replaced in in_place_of:
+            self._forget(replaced)
+        self._note(image, time, {self._started: self.results[self._started]})
+        return self._started
 
-    def _attempt(self, work: Callable[[], TrackResult | None]) -> TrackResult | None:
+    def update(self, image: npt.NDArray, time: float,
+               only: Collection[int] | None = None) -> dict[int, TrackResult]:
+        """Find the targets, or only some of them, in their next frame."""
+        results = self._attempt(lambda: self._step(image, time, only))
+        if results is None:
+            self._resume()
+            results = self._step(image, time, only)
+        self._note(image, time, results)
+        return results
+
+    def drop(self, number: int) -> None:
+        """Forget a target."""
+        self._tracker.drop(self._numbers[number])
+        self._forget(number)
+
+    def reset(self) -> None:
+        """Forget all targets."""
+        self._tracker.reset()
+        self._numbers, self._found = {}, {}
+
+    def _start(self, image: npt.NDArray, box: BoundingBox, time: float,
+               in_place_of: Collection[int]) -> int:
+        return self._tracker.initialize(image, box, time, self._inwards(in_place_of))
+
+    def _step(self, image: npt.NDArray, time: float,
+              only: Collection[int] | None) -> dict[int, TrackResult]:
+        return self._outwards(self._tracker.update(
+            image, time, None if only is None else self._inwards(only)))
+
+    def _inwards(self, numbers: Collection[int]) -> list[int]:
+        return [self._numbers[number] for number in numbers]
+
+    def _outwards(self, results: Mapping[int, TrackResult]) -> dict[int, TrackResult]:
+        return {number: results[known] for number, known in self._numbers.items()
+                if known in results}
+
+    def _attempt(self, work: Callable[[], _Done]) -> _Done | None:
         """Return what comes of the work; None after a retreat to the processor."""
         try:
             return work()
@@ -89,20 +139,26 @@ class FallbackTracker:
     def _use(self, tracker: Tracker) -> None:
         self._tracker = tracker
 
-    def _resume(self, image: npt.NDArray, time: float) -> TrackResult:
-        # Nothing is updated before a start, of which the frame is kept.
-        assert self._found is not None
-        self._tracker.initialize(*self._found)
-        self._found = None
-        return self._tracker.update(image, time)
+    def _resume(self) -> None:
+        """Start anew on every target where it was seen last."""
+        found, self._found, self._numbers = self._found, {}, {}
+        for number, (image, box, time) in found.items():
+            self._numbers[number] = self._tracker.initialize(image, box, time)
 
-    def _noted(self, image: npt.NDArray, result: TrackResult, time: float) -> TrackResult:
-        """Keep the newest frame that shows the target, for as long as there is a way back."""
-        if self._device != 'cpu' and result.state is not TrackState.LOST:
+    def _note(self, image: npt.NDArray, time: float,
+              results: Mapping[int, TrackResult]) -> None:
+        """Keep the newest frame that shows each target, for as long as there is a way back."""
+        seen = {number: result.box for number, result in results.items()
+                if result.state is not TrackState.LOST}
+        if self._device != 'cpu' and seen:
             # A copy, as the tracker keeps nothing of an image either: this one may be a part of
             # a larger message, or be written over by the next frame.
-            self._found = image.copy(), result.box, time
-        return result
+            kept = image.copy()
+            self._found |= {number: (kept, box, time) for number, box in seen.items()}
+
+    def _forget(self, number: int) -> None:
+        self._numbers.pop(number, None)
+        self._found.pop(number, None)
 
 
 def _is_out_of_memory(error: RuntimeError) -> bool:

@@ -21,6 +21,7 @@ from collections.abc import Callable
 import contextlib
 import functools
 import time
+from typing import Any
 
 from builtin_interfaces.msg import Time
 from geometry_msgs.msg import PolygonStamped
@@ -29,10 +30,11 @@ from rclpy.qos import HistoryPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.serialization import deserialize_message
 from rclpy.subscription import Subscription
 from sensor_msgs.msg import CompressedImage, Image, RegionOfInterest
-from std_msgs.msg import Header
+from std_msgs.msg import Header, UInt32
 
 from lmsco_ros.core.errors import LMSCOError
 from lmsco_ros.core.types import BoundingBox
+from lmsco_ros.node.detection_policy import Candidate
 from lmsco_ros.node.diagnostics import HealthMonitor, Problem
 from lmsco_ros.node.faults import cause
 from lmsco_ros.node.guarded_node import GuardedNode
@@ -43,7 +45,8 @@ from lmsco_ros.node.outcome import PendingFrame
 from lmsco_ros.node.parameters import Settings
 from lmsco_ros.node.received import ReceivedImage, WhileThereIsRoom
 from lmsco_ros.node.worker import TrackerWorker
-from msg_adapters.boxes import box_from_polygon, box_from_region
+from msg_adapters.boxes import (
+    box_from_polygon, box_from_region, detections_available, tracked_from_detections)
 from msg_adapters.compressed import image_from_compressed
 from msg_adapters.errors import MessageError
 from msg_adapters.image import image_from_message
@@ -77,18 +80,20 @@ class Inputs:
     """
 
     def __init__(self, node: GuardedNode, settings: Settings, worker: TrackerWorker,
-                 monitor: HealthMonitor, refuse: Callable[[Header, str], None]) -> None:
+                 monitor: HealthMonitor, refuse: Callable[..., None]) -> None:
         self._node = node
         self._worker = worker
         self._monitor = monitor
         self._refuse = refuse
         self._crop = settings.crop
+        self._policy = settings.detection_policy
         with contextlib.ExitStack() as made:
             self._image_type, self._images = self._subscribe_images(settings)
             made.callback(node.destroy_subscription, self._images)
             for kind, topic, callback in (
                     (RegionOfInterest, 'init_box', self._on_region),
-                    (PolygonStamped, 'init_box_stamped', self._on_polygon)):
+                    (PolygonStamped, 'init_box_stamped', self._on_polygon),
+                    (UInt32, 'select', self._on_select), *self._detector()):
                 made.callback(node.destroy_subscription, node.create_subscription(
                     kind, topic, callback, _BOX_DEPTH))
             self._made = made.pop_all()
@@ -170,12 +175,44 @@ class Inputs:
         stamp = _nanoseconds(polygon.header.stamp) or None
         self._start(polygon.header, polygon, box_from_polygon, stamp)
 
+    def _detector(self) -> list[tuple[type, str, Callable]]:
+        """Return the subscription for a detector, where its messages are installed."""
+        if not detections_available():
+            return []
+        from vision_msgs.msg import Detection2DArray
+        return [(Detection2DArray, 'init_detections', self._on_detections)]
+
+    def _on_detections(self, message: Any) -> None:
+        worker, policy = self._worker, self._policy
+        try:
+            found = [Candidate(self._crop.inwards(BoundingBox(*each.box)), each.score,
+                               each.class_id) for each in tracked_from_detections(message)]
+        except (MessageError, LMSCOError) as error:
+            self._refuse(message.header, str(error), start=True)
+            return
+        if worker.image_size is None:
+            # Before the first image nobody knows where its center is; detectors go on talking.
+            return
+        box = policy.pick(found, worker.results, worker.image_size)
+        if box is not None:
+            worker.offer(box, _nanoseconds(message.header.stamp) or None,
+                         lambda results: policy.wants(box, results))
+
+    def _on_select(self, message: UInt32) -> None:
+        ids = tuple(self._worker.results)
+        if message.data in ids:
+            self._worker.select(message.data)
+            return
+        known = ', '.join(map(str, ids)) or 'none; publish a box on init_box'
+        self._refuse(Header(), f'there is no target {message.data} to select; followed are '
+                     f'{known}')
+
     def _start(self, header: Header, message: RegionOfInterest | PolygonStamped,
                read: Callable, stamp: int | None) -> None:
         try:
             box = self._crop.inwards(BoundingBox(*read(message)))
         except (MessageError, LMSCOError) as error:
-            self._refuse(header, str(error))
+            self._refuse(header, str(error), start=True)
         else:
             self._worker.initialize(box, stamp)
 

@@ -87,6 +87,11 @@ class Mailbox(ABC, Generic[T]):
     def skips_behind(self, late: Callable[[T], bool]) -> bool:
         """Tell whether a frame put now may be dropped while late items wait before it."""
 
+    def holds(self, kind: Callable[[T], bool]) -> bool:
+        """Tell whether such an item waits."""
+        with self._changed:
+            return any(map(kind, self._items))
+
     def close(self) -> None:
         """Wake whoever waits, and forget what waits; nothing is handed out from now on."""
         with self._changed:
@@ -130,8 +135,7 @@ class LatestMailbox(Mailbox[T]):
 
     def skips_behind(self, late: Callable[[T], bool]) -> bool:
         """Tell whether late items wait."""
-        with self._changed:
-            return any(map(late, self._items))
+        return self.holds(late)
 
 
 class BoundedMailbox(Mailbox[T]):

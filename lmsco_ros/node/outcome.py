@@ -16,6 +16,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from enum import Enum
 from typing import Any, Protocol
@@ -26,13 +27,29 @@ from lmsco_ros.core.types import BoundingBox, TrackResult
 
 
 class Tracker(Protocol):
-    """The part of the tracker that the node uses."""
+    """The part of the tracker of several targets that the node uses."""
 
-    def initialize(self, image: npt.NDArray, box: BoundingBox, time: float) -> TrackResult:
-        """Start on a target in a frame that was taken at a time, in seconds."""
+    @property
+    def results(self) -> Mapping[int, TrackResult]:
+        """What was last said of each target, by its number."""
 
-    def update(self, image: npt.NDArray, time: float) -> TrackResult:
-        """Find the target in the next frame."""
+    def initialize(self, image: npt.NDArray, box: BoundingBox, time: float,
+                   in_place_of: Collection[int] = ()) -> int:
+        """
+        Start on a target in place of others, in a frame that was taken at a time, in seconds.
+
+        Returns its number, never used before.
+        """
+
+    def update(self, image: npt.NDArray, time: float,
+               only: Collection[int] | None = None) -> Mapping[int, TrackResult]:
+        """Find the targets, or only some of them, in their next frame."""
+
+    def drop(self, number: int) -> None:
+        """Forget a target."""
+
+    def reset(self) -> None:
+        """Forget all targets."""
 
 
 class Picture(Protocol):
@@ -92,6 +109,32 @@ class PendingFrame:
         return 1e-9 * self.stamp
 
 
+@dataclass(frozen=True)
+class StartAnswer:
+    """
+    What became of a wish to start.
+
+    Attributes
+    ----------
+    number : int
+        Of the new target; 0 where the start is refused.
+    replaced : tuple of int
+        Targets that it has taken the place of.
+    reason : str
+        Why the start is refused.
+
+    """
+
+    number: int = 0
+    replaced: tuple[int, ...] = ()
+    reason: str = ''
+
+    @property
+    def accepted(self) -> bool:
+        """Whether there is a new target."""
+        return self.number > 0
+
+
 class Phase(Enum):
     """What became of a frame."""
 
@@ -111,31 +154,48 @@ class Outcome:
     ----------
     frame : PendingFrame
     phase : Phase
-        TRACKED (there is a result), IDLE (no target), DISABLED, REFUSED (a request or a
-        frame could not be used; nothing changed) or FAILED (the tracker raised; the target is
+        TRACKED (there are results), IDLE (no target), DISABLED, REFUSED (a request or a
+        frame could not be used; nothing changed) or FAILED (the tracker raised; the targets are
         dropped).
-    result : TrackResult or None
-        Only when TRACKED.
+    results : mapping of int to TrackResult
+        By the numbers of the targets; empty unless TRACKED.
     track_id : int
-        Number of the start that the result belongs to; 0 before the first.
+        Number of the selected target; of the latest start where there is none, 0 before it.
     live : bool
         False for frames that are gone through again after a start in the past.
     error : str
-        Why the request was refused or the target dropped.
+        Why the request was refused or the targets dropped.
     started, finished : float
         When the work on the frame, its reading included, began and ended, on the clock of
         `time.monotonic`.
     image : ndarray or None
         The pixels of the frame; None when they could not be read, or nobody had to.
+    start : StartAnswer or None
+        Where somebody had asked to start on this frame.
+    dropped : tuple of int
+        Targets with a result here that are dropped, since they were lost for too long.
 
     """
 
     frame: PendingFrame
     phase: Phase
-    result: TrackResult | None
+    results: Mapping[int, TrackResult]
     track_id: int
     live: bool
     error: str
     started: float
     finished: float
     image: npt.NDArray | None = None
+    start: StartAnswer | None = None
+    dropped: tuple[int, ...] = ()
+
+    @property
+    def result(self) -> TrackResult | None:
+        """What there is to say of the selected target."""
+        return self.results.get(self.track_id)
+
+    @property
+    def refused(self) -> bool:
+        """Whether a frame or a start could not be used."""
+        return self.phase is Phase.REFUSED or (
+            self.phase is Phase.TRACKED and self.start is not None and not self.start.accepted)

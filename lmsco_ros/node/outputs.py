@@ -17,12 +17,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 import contextlib
 import time
-from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray
-from geometry_msgs.msg import PolygonStamped
+from geometry_msgs.msg import PolygonInstanceStamped, PolygonStamped
 import numpy.typing as npt
 from rclpy.lifecycle import LifecycleNode
 from rclpy.lifecycle.publisher import LifecyclePublisher
@@ -31,17 +31,18 @@ from std_msgs.msg import Header
 from visualization_msgs.msg import ImageMarker
 
 from lmsco_ros.core.types import TrackResult, TrackState
-from lmsco_ros.node.diagnostics import frame_status
+from lmsco_ros.node.diagnostics import frame_statuses, Readings
 from lmsco_ros.node.outcome import Outcome
 from lmsco_ros.node.parameters import Settings
 from lmsco_ros.node.target_temperature import celsius, target_reading
 from lmsco_ros.visualization.display_range import DisplayRange
-from lmsco_ros.visualization.overlay import draw_overlay, state_color
-from msg_adapters.boxes import detections_available, detections_from_box, polygon_from_box
+from lmsco_ros.visualization.overlay import draw_targets, state_color
+from msg_adapters.boxes import (
+    detections_available, detections_from_boxes, instance_from_box, polygon_from_box, Tracked)
 from msg_adapters.confidence import message_from_confidence
 from msg_adapters.image import message_from_image
 from msg_adapters.markers import marker_from_box, marker_removal
-from msg_adapters.status import FrameStatus, message_from_status
+from msg_adapters.status import FrameStatus, message_from_statuses
 
 _DEPTH = 10
 
@@ -66,6 +67,7 @@ class Outputs:
         self._frames = 0
         with contextlib.ExitStack() as made:
             self._box = self._publisher(PolygonStamped, 'box', made)
+            self._boxes = self._publisher(PolygonInstanceStamped, 'boxes', made)
             self._status = self._publisher(DiagnosticArray, 'status', made)
             self._confidence = self._publisher(Image, 'confidence_map', made)
             self._overlay = self._publisher(Image, 'overlay', made)
@@ -84,27 +86,35 @@ class Outputs:
 
         """
         header, crop = outcome.frame.context, self.settings.crop
-        result = None if outcome.result is None else crop.outwards(outcome.result)
-        found = result if result is not None and result.state is not TrackState.LOST else None
-        if found is not None:
-            self._box.publish(polygon_from_box(found.box.as_tuple(), header))
+        results = {number: crop.outwards(result) for number, result in outcome.results.items()}
+        found = {number: result for number, result in results.items()
+                 if result.state is not TrackState.LOST}
+        result = results.get(outcome.track_id)
+        if outcome.track_id in found:
+            self._box.publish(polygon_from_box(found[outcome.track_id].box.as_tuple(), header))
+        for number, each in found.items():
+            self._boxes.publish(instance_from_box(each.box.as_tuple(), number, header))
         published = time.monotonic()
-        self.publish_status(self._frame_status(outcome, dropped_frames, published), header)
+        self.publish_statuses(frame_statuses(
+            outcome, dropped_frames, published,
+            lambda result: self._readings(outcome.image, result)), header)
         if self._detections is not None and _is_heard(self._detections):
-            self._detections.publish(_detections(found, outcome.track_id, header))
+            self._detections.publish(detections_from_boxes(
+                [Tracked(each.box.as_tuple(), str(number), each.score)
+                 for number, each in found.items()], header))
         if _is_heard(self._marker):
-            self._marker.publish(self._outline(found, header))
+            self._marker.publish(self._outline(found.get(outcome.track_id), header))
         if result is not None and outcome.image is not None and _is_heard(self._confidence):
             self._confidence.publish(message_from_confidence(
                 result.confidence_map, result.search_region.as_tuple(),
                 crop.full_shape(outcome.image), header))
         if outcome.image is not None and _is_heard(self._overlay):
-            self._publish_overlay(outcome.image, result, header)
+            self._publish_overlay(outcome.image, results, outcome.track_id, header)
         return published
 
-    def publish_status(self, status: FrameStatus, header: Header) -> None:
+    def publish_statuses(self, statuses: Sequence[FrameStatus], header: Header) -> None:
         """Say how things are with one frame."""
-        self._status.publish(message_from_status(status, self._node.get_name(), header))
+        self._status.publish(message_from_statuses(statuses, self._node.get_name(), header))
 
     def close(self) -> None:
         """Take the topics away."""
@@ -131,33 +141,21 @@ class Outputs:
         return marker_from_box(found.box.as_tuple(), (red, green, blue), namespace=namespace,
                                line_width=self.settings.marker_line_width, header=header)
 
-    def _frame_status(self, outcome: Outcome, dropped_frames: int,
-                      published: float) -> FrameStatus:
-        result, reading = outcome.result, None
-        if result is not None and outcome.image is not None \
-                and result.state is not TrackState.LOST:
-            reading = target_reading(outcome.image, result.box.as_tuple())
+    def _readings(self, image: npt.NDArray | None, result: TrackResult) -> Readings:
+        """Return what is counted under a box of the image that the tracker sees."""
+        reading = None if image is None else target_reading(image, result.box.as_tuple())
         settings = self.settings
-        return frame_status(
-            outcome, dropped_frames, published, target=reading, target_celsius=celsius(
-                reading, settings.radiometric_scale, settings.radiometric_offset))
+        return Readings(reading, celsius(
+            reading, settings.radiometric_scale, settings.radiometric_offset))
 
-    def _publish_overlay(self, image: npt.NDArray, result: TrackResult | None,
-                         header: Header) -> None:
+    def _publish_overlay(self, image: npt.NDArray, results: Mapping[int, TrackResult],
+                         selected: int, header: Header) -> None:
         self._frames += 1
         if self._frames % self.settings.overlay_interval:
             return
         view = self.settings.crop.fill(self._display_range.apply(image))
-        picture = draw_overlay(view, result, label=self.settings.overlay_label)
+        picture = draw_targets(view, results, selected, label=self.settings.overlay_label)
         self._overlay.publish(message_from_image(picture, encoding='bgr8', header=header))
-
-
-def _detections(found: TrackResult | None, track_id: int, header: Header) -> Any:
-    """Return the box as a detection; none while there is no target."""
-    if found is None:
-        return detections_from_box(None, header=header)
-    return detections_from_box(found.box.as_tuple(), track_id=str(track_id),
-                               score=found.score, header=header)
 
 
 def _is_heard(publisher: LifecyclePublisher) -> bool:

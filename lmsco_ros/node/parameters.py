@@ -31,6 +31,7 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter
 
 from lmsco_ros.node.crop import Crop
+from lmsco_ros.node.detection_policy import DetectionPolicy
 from msg_adapters.compressed import DecodingLimits
 
 
@@ -79,6 +80,24 @@ class Settings:
     threads: int = _setting(
         0, 'Threads of the numerical libraries; more than cores to spare starve the '
         'reception of images. 0: as the tracker configuration says.', limits=(0, 256))
+    max_targets: int = _setting(
+        1, 'Targets that are followed at once. A start beyond it takes the place of the one that '
+        'is lost for the longest time, or of the selected one where none is lost: with 1, every '
+        'start replaces the one before.', limits=(1, 64))
+    drop_after: float = _setting(
+        0.0, 'Seconds, by the stamps of the images, after which a lost target is dropped. 0: it '
+        'is searched for until it is found again.', limits=(0.0, 86400.0))
+    detection_choice: str = _setting(
+        'highest_score', 'On which of the boxes of init_detections to start where several fit: '
+        'highest_score, or nearest_to_center of the image.',
+        choices=('highest_score', 'nearest_to_center'))
+    detection_classes: str = _setting(
+        '', 'Classes of init_detections to start on, separated by commas. Empty: any.')
+    detection_min_score: float = _setting(
+        0.5, 'Score from which a box of init_detections is one to start on.', limits=(0.0, 1.0))
+    detection_restart: bool = _setting(
+        True, 'Whether a box of init_detections takes the place of a target that is lost; '
+        'otherwise only a free place is taken.')
     image_transport: str = _setting(
         'raw', 'raw: sensor_msgs/Image on image_raw; compressed: sensor_msgs/CompressedImage '
         '(jpeg, png) on image_raw/compressed.', choices=('raw', 'compressed'))
@@ -141,6 +160,14 @@ class Settings:
     def decoding_limits(self) -> DecodingLimits:
         """What it may cost to decode a compressed image."""
         return DecodingLimits(self.max_image_pixels, self.max_jpeg_scans)
+
+    @property
+    def detection_policy(self) -> DetectionPolicy:
+        """On which of the boxes of a detector to start."""
+        names = (name.strip() for name in self.detection_classes.split(','))
+        return DetectionPolicy(self.detection_choice, frozenset(filter(None, names)),
+                               self.detection_min_score, self.detection_restart,
+                               self.max_targets)
 
     @property
     def crop(self) -> Crop:

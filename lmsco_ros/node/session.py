@@ -22,6 +22,7 @@ from collections.abc import Callable
 from std_msgs.msg import Header
 
 from lmsco_ros.node.diagnostics import HealthMonitor, Problem, refused_status
+from lmsco_ros.node.followed_targets import FollowedTargets
 from lmsco_ros.node.guarded_node import GuardedNode
 from lmsco_ros.node.history import FrameHistory
 from lmsco_ros.node.inputs import Inputs
@@ -64,7 +65,8 @@ class TrackingSession:
         self._outputs = outputs
         self._monitor = monitor
         self.worker = TrackerWorker(
-            tracker, self._deliver, on_fault=node.faults.note,
+            FollowedTargets(tracker, settings.max_targets, settings.drop_after),
+            self._deliver, on_fault=node.faults.note,
             mailbox=_mailbox(settings, node.guarded('waking the executor', self._wake)),
             history=FrameHistory(settings.frame_history_seconds, settings.frame_history_frames,
                                  settings.frame_history_megabytes * _MEGABYTE))
@@ -99,9 +101,11 @@ class TrackingSession:
         log = self._node.get_logger()
         self._monitor.answered(outcome)
         if outcome.phase is Phase.FAILED:
-            log.error(f'the tracker failed, the target is dropped: {outcome.error}')
-        elif outcome.phase is Phase.REFUSED:
+            log.error(f'the tracker failed, the targets are dropped: {outcome.error}')
+        elif outcome.refused:
             log.error(outcome.error, throttle_duration_sec=_QUIET_SECONDS)
+        for number in outcome.dropped:
+            log.info(f'target {number} is dropped: it was lost for too long (drop_after)')
         published = self._outputs.publish(outcome, self.worker.dropped_frames)
         self._monitor.published(outcome, published)
 
@@ -111,11 +115,11 @@ class TrackingSession:
         if executor is not None:
             executor.wake()
 
-    def _refuse(self, header: Header, reason: str) -> None:
-        """Tell that a message cannot be used."""
+    def _refuse(self, header: Header, reason: str, start: bool = False) -> None:
+        """Tell that a message cannot be used, and whether it was one to start."""
         self._monitor.refused(reason)
-        self._outputs.publish_status(refused_status(
-            reason, self.worker.track_id, self.worker.dropped_frames), header)
+        self._outputs.publish_statuses([refused_status(
+            reason, self.worker.track_id, self.worker.dropped_frames, start=start)], header)
         self._node.get_logger().error(reason, throttle_duration_sec=_QUIET_SECONDS)
 
 

@@ -19,7 +19,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 
-from lmsco_ros.core import LMSCOTracker, TrackerConfig
+from lmsco_ros.core import MultiTracker, TrackerConfig
 from lmsco_ros.node.gpu_fallback import FallbackTracker
 from lmsco_ros.node.outcome import Tracker
 from lmsco_ros.node.parameters import Settings
@@ -45,9 +45,9 @@ def tracker_config(settings: Settings) -> TrackerConfig:
         threads=settings.threads or runtime.threads))
 
 
-def make_tracker(settings: Settings) -> LMSCOTracker:
+def make_tracker(settings: Settings) -> MultiTracker:
     """Return a tracker as the parameters describe it; raises as :func:`tracker_config`."""
-    return LMSCOTracker(tracker_config(settings))
+    return MultiTracker(tracker_config(settings))
 
 
 def with_fallback(factory: Callable[[Settings], Tracker], settings: Settings,

@@ -68,7 +68,7 @@ class TrackerNode(GuardedNode):
     Connects ROS to a tracker; decides nothing itself.
 
     Configured: parameters are read, the tracker exists, topics and services are offered.
-    Active: images are received and tracked. Deactivating drops the target.
+    Active: images are received and tracked. Deactivating drops the targets.
 
     Parameters
     ----------
@@ -141,7 +141,7 @@ class TrackerNode(GuardedNode):
 
     @_reported
     def on_deactivate(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """Stop to receive and track; the target is dropped."""
+        """Stop to receive and track; the targets are dropped."""
         if not self._stop_session():
             # Its thread still uses the tracker: neither may be used again.
             self.get_logger().error('the tracker did not come back from its last frame')
@@ -195,7 +195,7 @@ class TrackerNode(GuardedNode):
         response.message = _NOT_ACTIVE
         if self._session is not None:
             self._session.worker.reset()
-            response.success, response.message = True, 'the target is dropped'
+            response.success, response.message = True, 'all targets are dropped'
         return response
 
     def _on_set_enabled(self, request: SetBool.Request,

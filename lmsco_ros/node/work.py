@@ -16,9 +16,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
-from lmsco_ros.core.types import BoundingBox
+from lmsco_ros.core.types import BoundingBox, TrackResult
 from lmsco_ros.node.outcome import PendingFrame
 
 
@@ -30,13 +31,23 @@ class Orders:
     resets: int = 0
 
 
+def _always(results: Mapping[int, TrackResult]) -> bool:
+    """Tell that a start is wanted, whatever is followed."""
+    return True
+
+
 @dataclass(frozen=True, eq=False)
 class Request:
-    """A wish to start; without a stamp any frame will do."""
+    """
+    A wish to start; without a stamp any frame will do.
+
+    One of a machine is met only while it is wanted, and is no matter otherwise.
+    """
 
     box: BoundingBox
     stamp: int | None
     made: float
+    is_wanted: Callable[[Mapping[int, TrackResult]], bool] = _always
 
     def wants(self, frame: PendingFrame) -> bool:
         """Tell whether the frame is the one to start on."""
@@ -50,11 +61,17 @@ class Request:
 
 @dataclass(frozen=True, eq=False)
 class Step:
-    """A frame to follow the target in; not live when it is gone through late."""
+    """
+    A frame to follow the targets in; not live when it is gone through late.
+
+    One that only a target started in the past goes through, since the others have seen it, names
+    the wish to start on that target.
+    """
 
     frame: PendingFrame
     orders: Orders
     live: bool = True
+    request: Request | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,6 +91,7 @@ class Refuse:
     frame: PendingFrame
     orders: Orders
     reason: str
+    request: Request
     live: bool = False
 
 
@@ -83,13 +101,3 @@ Item = Step | Start | Refuse
 def is_late_step(item: Item) -> bool:
     """Tell whether an item belongs to a start in the past that catches up."""
     return isinstance(item, Step) and not item.live
-
-
-def answers_no_frame(item: Item) -> bool:
-    """Tell whether an item is there for a request alone, and not because a frame came."""
-    return not item.live
-
-
-def is_live_start(item: Item) -> bool:
-    """Tell whether an item starts on a frame that is answered by that."""
-    return isinstance(item, Start) and item.live

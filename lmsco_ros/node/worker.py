@@ -15,30 +15,30 @@
 """
 A tracker in a thread of its own, fed through a mailbox; knows nothing of ROS.
 
-Frames and requests take effect in the order in which they were given, except that a reset
-reaches what waits as well. Images are read here, when their turn comes. Everything that
-happens to a frame comes back as an :class:`~lmsco_ros.node.outcome.Outcome`, errors included.
+Images are read here, when their turn comes. Everything that happens to a frame comes back as an
+:class:`~lmsco_ros.node.outcome.Outcome`, errors included.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import replace
+from collections.abc import Callable, Mapping
 import threading
 import time
+from types import MappingProxyType
 
 import numpy.typing as npt
 
 from lmsco_ros.core.errors import LMSCOError
-from lmsco_ros.core.types import BoundingBox, TrackResult
-from lmsco_ros.node.history import FrameHistory, NANOSECONDS
+from lmsco_ros.core.types import TrackResult
+from lmsco_ros.node.followed_targets import FollowedTargets
+from lmsco_ros.node.history import FrameHistory
+from lmsco_ros.node.intake import Intake
 from lmsco_ros.node.mailbox import Mailbox
-from lmsco_ros.node.outcome import Outcome, PendingFrame, Phase, Tracker
-from lmsco_ros.node.work import (answers_no_frame, is_late_step, is_live_start, Item, Orders,
-                                 Refuse, Request, Start, Step)
+from lmsco_ros.node.outcome import Outcome, PendingFrame, Phase, StartAnswer
+from lmsco_ros.node.work import Item, Refuse, Request, Start, Step
 
 
-class TrackerWorker:
+class TrackerWorker(Intake):
     """
     Runs a tracker over frames as they come.
 
@@ -46,63 +46,54 @@ class TrackerWorker:
 
     Parameters
     ----------
-    tracker : Tracker
-        Used by the worker's thread only.
+    targets : FollowedTargets
+        Changed by the worker's thread only.
     deliver : callable
         Called with every outcome, in the worker's thread.
-    mailbox : Mailbox
-        Decides what happens when frames come faster than they are tracked: a
-        :class:`~lmsco_ros.node.mailbox.LatestMailbox` drops the older ones, a
-        :class:`~lmsco_ros.node.mailbox.BoundedMailbox` says when to hold back.
-    history : FrameHistory
-        Frames to start on later.
+    mailbox, history
+        As of :class:`~lmsco_ros.node.intake.Intake`.
     on_fault : callable
         Called with what was being done and what was raised by it that nobody expects, in the
         worker's thread; must not raise.
 
+    Attributes
+    ----------
+    image_size : tuple of int or None
+        Width and height of the last image that was read.
+
     """
 
-    def __init__(self, tracker: Tracker, deliver: Callable[[Outcome], None], *,
+    def __init__(self, targets: FollowedTargets, deliver: Callable[[Outcome], None], *,
                  mailbox: Mailbox[Item], history: FrameHistory[PendingFrame],
                  on_fault: Callable[[str, BaseException], object]) -> None:
-        self._tracker = tracker
+        super().__init__(mailbox, history, targets.most)
+        self._targets = targets
         self._deliver = deliver
-        self._mailbox = mailbox
-        self._history = history
         self._on_fault = on_fault
-        self._intake = threading.Lock()
-        self._orders = Orders()
-        self._request: Request | None = None
-        self._newest_request: Request | None = None
-        self._dropped = 0
-        self._extra_steps = self._extra_bytes = 0
+        self.image_size: tuple[int, int] | None = None
         # The rest belongs to the thread alone.
         self._busy_since: float | None = None
-        self._track_id = 0
-        self._target_of: int | None = None
+        self._cleared: int | None = None
+        self._newest_start: tuple[Request, int] | None = None
         self._stopping = threading.Event()
         # A tracker that never returns must not keep the process alive.
         self._thread = threading.Thread(target=self._run, name='tracker', daemon=True)
 
     @property
-    def dropped_frames(self) -> int:
-        """Frames that were never tracked because newer ones came."""
-        return self._dropped
+    def track_id(self) -> int:
+        """Number of the selected target, of the latest where there is none; 0 before it."""
+        return self._targets.selected
 
     @property
-    def track_id(self) -> int:
-        """Number of the latest start; 0 before the first."""
-        return self._track_id
+    def results(self) -> Mapping[int, TrackResult]:
+        """What was last said of each target, by its number."""
+        return self._targets.results
 
     @property
     def busy_seconds(self) -> float:
         """Time since the work on the present frame began; 0 while the worker waits."""
         since = self._busy_since
         return 0.0 if since is None else time.monotonic() - since
-
-    def has_room(self) -> bool:
-        """Tell whether another frame should be handed over now."""
-        return self._mailbox.has_room()
 
     def start(self) -> None:
         """Start the thread."""
@@ -135,86 +126,9 @@ class TrackerWorker:
             self._thread.join(timeout)
         return not self._thread.is_alive()
 
-    def submit(self, frame: PendingFrame) -> None:
-        """Hand over the next frame."""
-        with self._intake:
-            self._history.add(frame)
-            orders, request = self._orders, self._request
-            if request is not None and request.wants(frame):
-                self._request = None
-                self._mailbox.put(Start(frame, orders, request, live=True))
-                return
-            if request is not None and request.has_missed(frame, self._history.seconds):
-                self._request = None
-                self._mailbox.put(
-                    Refuse(frame, orders, _unknown_stamp(request.stamp, self._history)))
-            if self._may_follow(frame):
-                self._mailbox.put(Step(frame, orders, live=False))
-            else:
-                self._dropped += self._mailbox.put_frame(Step(frame, orders))
-
-    def initialize(self, box: BoundingBox, stamp: int | None = None) -> None:
-        """
-        Start on a target, in place of any other.
-
-        Parameters
-        ----------
-        box : BoundingBox
-            The target.
-        stamp : int, optional
-            Stamp of the frame that the box was seen in, in nanoseconds. Frames that came
-            since are gone through again, and those that come meanwhile, up to twice as many
-            as the history holds; then the newest is next. By default the newest frame is
-            taken. A start whose frame is still to come waits for it: without a stamp for the
-            first frame that can be read, with one no longer than frames are kept.
-
-        """
-        with self._intake:
-            self._supersede()
-            request = self._newest_request = Request(box, stamp, time.monotonic())
-            newest = self._history.last if self._history else None
-            if newest is None or stamp is not None and stamp > newest.stamp:
-                self._request = request
-                return
-            frames = [newest] if stamp is None else self._history.since(stamp)
-            if not frames:
-                self._mailbox.put(
-                    Refuse(newest, self._orders, _unknown_stamp(stamp, self._history)))
-                return
-            self._mailbox.put(Start(frames[0], self._orders, request))
-            self._extra_steps, self._extra_bytes = self._history.frames, self._history.nbytes
-            for frame in frames[1:]:
-                self._mailbox.put(Step(frame, self._orders, live=False))
-
-    def reset(self) -> None:
-        """
-        Drop the target, and every start that was asked for.
-
-        It takes effect at once: frames that wait are answered without a target.
-        """
-        with self._intake:
-            self._supersede()
-            self._orders = replace(self._orders, resets=self._orders.resets + 1)
-
-    def set_enabled(self, enabled: bool) -> None:
-        """Pause, keeping the target, or go on."""
-        with self._intake:
-            self._orders = replace(self._orders, enabled=enabled)
-
-    def _supersede(self) -> None:
-        """Forget what earlier starts still have to do."""
-        self._request = self._newest_request = None
-        self._extra_steps = 0
-        self._dropped += self._mailbox.supersede(answers_no_frame, is_live_start)
-
-    def _may_follow(self, frame: PendingFrame) -> bool:
-        """Tell whether a start in the past that catches up goes through this frame, too."""
-        follows = (self._extra_steps > 0 and self._extra_bytes >= frame.nbytes
-                   and self._mailbox.skips_behind(is_late_step))
-        if follows:
-            self._extra_steps -= 1
-            self._extra_bytes -= frame.nbytes
-        return follows
+    def select(self, number: int) -> None:
+        """Choose the target that is spoken of where only one is."""
+        self._targets.select(number)
 
     def _run(self) -> None:
         while (item := self._mailbox.take()) is not None:
@@ -228,11 +142,12 @@ class TrackerWorker:
 
     def _handle(self, item: Item) -> None:
         """Read the frame of an item, and do what the item asks for."""
+        self._obey_resets()
         reset_since = item.orders.resets != self._orders.resets
         if reset_since and not item.live:
             return
         if isinstance(item, Refuse):
-            self._report(item, Phase.REFUSED, item.reason)
+            self._report(item, Phase.REFUSED, item.reason, start=StartAnswer(reason=item.reason))
             return
         started = time.monotonic()
         try:
@@ -243,75 +158,107 @@ class TrackerWorker:
             self._set_aside(item, f'the image cannot be read: {type(error).__name__}: {error}',
                             started)
         else:
+            self.image_size = image.shape[1], image.shape[0]
             if isinstance(item, Start) and not reset_since:
                 self._begin(item, image, started)
             else:
                 self._step(item, image, started)
 
+    def _obey_resets(self) -> None:
+        """Drop all targets if that was asked for since it was done last."""
+        resets = self._orders.resets
+        if self._cleared != resets:
+            self._targets.clear()
+            self._cleared = resets
+
     def _set_aside(self, item: Step | Start, reason: str, started: float) -> None:
         """Refuse an unreadable frame; a start that any frame would do for waits for another."""
+        start = None
         with self._intake:
             self._history.discard(item.frame)
-            if isinstance(item, Start) and item.request.stamp is None \
-                    and item.request is self._newest_request:
-                self._request = item.request
-        self._report(item, Phase.REFUSED, reason, started=started)
+            if isinstance(item, Start):
+                if item.request.stamp is None:
+                    self._wait_again(item.request)
+                else:
+                    start = StartAnswer(reason=reason)
+        self._report(item, Phase.REFUSED, reason, started=started, start=start)
 
     def _step(self, item: Step | Start, image: npt.NDArray, started: float) -> None:
+        self._obey_resets()
+        late = item.request if isinstance(item, Step) else None
+        only = None if late is None else self._late_target(late)
         if not item.orders.enabled:
             self._report(item, Phase.DISABLED, image=image, started=started)
-        elif self._target_of != self._orders.resets:
+        elif not self._targets.ids:
             self._report(item, Phase.IDLE, image=image, started=started)
-        else:
-            self._track(item, image, lambda: self._tracker.update(image, item.frame.seconds),
-                        started)
+        elif only is None or only:
+            self._track(item, image, lambda: (self._targets.step(
+                image, item.frame.seconds, only), None), started)
+
+    def _late_target(self, request: Request) -> tuple[int, ...]:
+        """Return the target of a start in the past, or nothing if there is none any more."""
+        if self._newest_start is None or self._newest_start[0] is not request:
+            return ()
+        return tuple({self._newest_start[1]} & set(self._targets.ids))
 
     def _begin(self, item: Start, image: npt.NDArray, started: float) -> None:
+        if not item.request.is_wanted(self._targets.results):
+            if item.live:
+                self._step(item, image, started)
+            return
         if not item.orders.enabled:
-            self._report(item, Phase.REFUSED, image=image, started=started,
-                         error='cannot start while tracking is disabled; enable it first')
+            reason = 'cannot start while tracking is disabled; enable it first'
+            self._report(item, Phase.REFUSED, reason, image=image, started=started,
+                         start=StartAnswer(reason=reason))
             return
 
-        def start() -> TrackResult:
-            result = self._tracker.initialize(image, item.request.box, item.frame.seconds)
-            self._track_id += 1
-            self._target_of = item.orders.resets
-            return result
+        def start() -> tuple[Mapping[int, TrackResult], StartAnswer | None]:
+            results, answer = self._targets.start(
+                image, item.frame.seconds, item.request.box, follow=item.live)
+            self._newest_start = (item.request, answer.number) if answer.accepted else None
+            return results, answer
 
         self._track(item, image, start, started)
 
     def _track(self, item: Step | Start, image: npt.NDArray,
-               work: Callable[[], TrackResult], started: float) -> None:
+               work: Callable[[], tuple[Mapping[int, TrackResult], StartAnswer | None]],
+               started: float) -> None:
         """
         Let the tracker work on a frame.
 
         What the tracker refuses leaves it as it was; anything else that it raises costs the
-        target, and only that.
+        targets, and only them.
         """
         try:
-            result = work()
+            results, start = work()
+            dropped = self._targets.give_up(results, item.frame.stamp)
         except LMSCOError as error:
-            self._report(item, Phase.REFUSED, str(error), image=image, started=started)
+            self._report(item, Phase.REFUSED, str(error), image=image, started=started,
+                         start=_refusal(item, str(error)))
         except Exception as error:  # noqa: B902
-            self._target_of = None
-            self._report(item, Phase.FAILED, f'{type(error).__name__}: {error}', image=image,
-                         started=started)
+            reason = f'{type(error).__name__}: {error}'
+            self._targets.clear()
+            self._report(item, Phase.FAILED, reason, image=image, started=started,
+                         start=_refusal(item, reason))
         else:
-            self._report(item, Phase.TRACKED, image=image, result=result, started=started)
+            self._report(item, Phase.TRACKED if results else Phase.REFUSED,
+                         '' if start is None else start.reason, results=results, image=image,
+                         started=started, start=start, dropped=dropped)
 
     def _report(self, item: Item, phase: Phase, error: str = '', *,
-                result: TrackResult | None = None, image: npt.NDArray | None = None,
-                started: float | None = None) -> None:
+                results: Mapping[int, TrackResult] = MappingProxyType({}),
+                image: npt.NDArray | None = None, started: float | None = None,
+                start: StartAnswer | None = None, dropped: tuple[int, ...] = ()) -> None:
         if not self._stopping.is_set():
             finished = time.monotonic()
-            self._deliver(Outcome(item.frame, phase, result, self._track_id, item.live, error,
-                                  finished if started is None else started, finished, image))
+            selected = self._targets.selected
+            # Where one that is started late catches up, nothing is said of the others.
+            track_id = selected if selected in results else max(results, default=selected)
+            self._deliver(Outcome(
+                item.frame, phase, results, track_id, item.live, error,
+                finished if started is None else started, finished, image, start, dropped))
 
 
-def _unknown_stamp(stamp: int | None, history: FrameHistory[PendingFrame]) -> str:
-    """Say why a start on a certain frame cannot be met."""
-    assert stamp is not None, 'a start without a stamp takes the newest frame'
-    first, last = history.first.stamp / NANOSECONDS, history.last.stamp / NANOSECONDS
-    return (f'no frame with the stamp {stamp / NANOSECONDS:.9f} is kept (there are '
-            f'{len(history)} from {first:.9f} to {last:.9f}); copy the stamp of the image that '
-            'the box was found in, or keep frames for longer')
+def _refusal(item: Item, reason: str) -> StartAnswer | None:
+    """Return the answer to the wish of an item, if it is one to start."""
+    return StartAnswer(reason=reason) if isinstance(item, Start) else None

@@ -15,6 +15,6 @@
 """Pictures of images and results for people; depends on the core types only."""
 
 from lmsco_ros.visualization.display_range import DisplayRange
-from lmsco_ros.visualization.overlay import draw_box, draw_overlay, state_color
+from lmsco_ros.visualization.overlay import draw_box, draw_overlay, draw_targets, state_color
 
-__all__ = ['DisplayRange', 'draw_box', 'draw_overlay', 'state_color']
+__all__ = ['DisplayRange', 'draw_box', 'draw_overlay', 'draw_targets', 'state_color']

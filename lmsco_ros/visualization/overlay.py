@@ -16,6 +16,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import cv2
 import numpy as np
 import numpy.typing as npt
@@ -72,6 +74,38 @@ def draw_overlay(image: npt.NDArray, result: TrackResult | None, *,
         _draw_status(canvas, result)
     if label:
         _draw_label(canvas, label)
+    return canvas
+
+
+def draw_targets(image: npt.NDArray, results: Mapping[int, TrackResult], selected: int, *,
+                 label: str = '') -> npt.NDArray[np.uint8]:
+    """
+    Draw the selected target as `draw_overlay` does, and the boxes of the others.
+
+    Parameters
+    ----------
+    image : ndarray
+        As for `draw_overlay`.
+    results : mapping of int to TrackResult
+        By the numbers of the targets, which are written beside the boxes where there are several.
+    selected : int
+        Of which target score and state are told.
+    label : str
+        Text for the lower left corner.
+
+    Returns
+    -------
+    ndarray, shape (H, W, 3), uint8 (BGR)
+        Same size as the image.
+
+    """
+    canvas = draw_overlay(image, results.get(selected), label=label)
+    for number, result in results.items():
+        if number != selected:
+            draw_box(canvas, result.box, state_color(result.state),
+                     dashed=result.state is TrackState.LOST)
+        if len(results) > 1:
+            _draw_number(canvas, number, result)
     return canvas
 
 
@@ -149,6 +183,19 @@ def _draw_status(canvas: npt.NDArray[np.uint8], result: TrackResult) -> None:
     filled = round(full * min(max(result.score, 0.0), 1.0))
     canvas[top:top + bar, left + pad:left + pad + full] = 70
     canvas[top:top + bar, left + pad:left + pad + filled] = color
+
+
+def _draw_number(canvas: npt.NDArray[np.uint8], number: int, result: TrackResult) -> None:
+    """Write the number of a target at the lower left corner of its box, below it or inside."""
+    text, scale = str(number), _text_scale(canvas)
+    (width, height), _ = cv2.getTextSize(text, _FONT, scale, 1)
+    pad = max(2, round(4 * scale))
+    plate = width + 2 * pad, height + 2 * pad
+    left = min(max(0, round(result.box.x)), max(0, canvas.shape[1] - plate[0]))
+    top = min(max(0, round(result.box.y + result.box.height) + 2),
+              max(0, canvas.shape[0] - plate[1]))
+    _darken(canvas, left, top, *plate)
+    _write(canvas, text, (left + pad, top + pad + height), scale, state_color(result.state))
 
 
 def _draw_label(canvas: npt.NDArray[np.uint8], label: str) -> None:

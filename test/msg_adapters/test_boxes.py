@@ -26,8 +26,8 @@ from std_msgs.msg import Header
 from visualization_msgs.msg import ImageMarker
 
 from msg_adapters.boxes import (
-    Box, box_from_polygon, box_from_region, boxes_from_detections, detections_available,
-    detections_from_box, polygon_from_box, region_from_box)
+    Box, box_from_polygon, box_from_region, detections_available, detections_from_boxes,
+    instance_from_box, polygon_from_box, region_from_box, Tracked, tracked_from_detections)
 from msg_adapters.errors import BoxMessageError
 from msg_adapters.markers import box_from_marker, marker_from_box, marker_removal
 
@@ -145,16 +145,50 @@ def vision_msgs():
 
 @given(box=BOXES)
 def test_detections_round_trip(vision_msgs, box):
-    array = detections_from_box(box, track_id='7', score=0.5, header=HEADER)
-    back, = boxes_from_detections(array)
-    np.testing.assert_allclose(back, box, atol=1e-9)
+    array = detections_from_boxes([Tracked(box, '7', 0.5)], HEADER)
+    back, = tracked_from_detections(array)
+    np.testing.assert_allclose(back.box, box, atol=1e-9)
+    assert back[1:] == ('7', 0.5, 'target')
     detection, = array.detections
     assert (detection.id, detection.header, array.header) == ('7', HEADER, HEADER)
     assert detection.results[0].hypothesis.score == 0.5
 
 
+def test_every_box_is_a_detection_of_its_own(vision_msgs):
+    array = detections_from_boxes(
+        [Tracked((1, 2, 3, 4), '7', 0.5), Tracked((5, 6, 7, 8), '9', 0.25, 'dog')], HEADER)
+    assert tracked_from_detections(array) == [
+        ((1, 2, 3, 4), '7', 0.5, 'target'), ((5, 6, 7, 8), '9', 0.25, 'dog')]
+    assert [(found.id, found.results[0].hypothesis.score, found.results[0].hypothesis.class_id)
+            for found in array.detections] == [('7', 0.5, 'target'), ('9', 0.25, 'dog')]
+
+
+@given(box=BOXES, track_id=st.integers(0, 2 ** 63 - 1))
+def test_instance_is_the_polygon_with_a_number(box, track_id):
+    instance, polygon = instance_from_box(box, track_id, HEADER), polygon_from_box(box, HEADER)
+    assert (instance.header, instance.polygon.polygon) == (polygon.header, polygon.polygon)
+    assert instance.polygon.id == track_id
+
+
+def test_best_hypothesis_of_a_detection_counts(vision_msgs):
+    array = detections_from_boxes([Tracked((1, 2, 3, 4), '7', 0.2, 'cat')] * 2)
+    first, second = array.detections
+    first.results = first.results + detections_from_boxes(
+        [Tracked((1, 2, 3, 4), '', 0.6, 'dog')]).detections[0].results
+    second.results = []
+    assert [found[2:] for found in tracked_from_detections(array)] == [(0.6, 'dog'), (1.0, '')]
+
+
+@pytest.mark.parametrize('size', [0.0, -1.0, float('nan'), float('inf')])
+def test_detection_without_an_area_is_refused(vision_msgs, size):
+    array = detections_from_boxes([Tracked((1, 2, 3, 4))])
+    array.detections[0].bbox.size_x = size
+    with pytest.raises(BoxMessageError):
+        tracked_from_detections(array)
+
+
 def test_no_box_is_no_detection(vision_msgs):
-    assert boxes_from_detections(detections_from_box(None)) == []
+    assert tracked_from_detections(detections_from_boxes([])) == []
 
 
 def test_vision_msgs_is_optional(monkeypatch):
@@ -162,4 +196,4 @@ def test_vision_msgs_is_optional(monkeypatch):
     monkeypatch.setitem(sys.modules, 'vision_msgs.msg', None)
     assert not detections_available()
     with pytest.raises(ImportError):
-        detections_from_box((0, 0, 1, 1))
+        detections_from_boxes([Tracked((0, 0, 1, 1))])

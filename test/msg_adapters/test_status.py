@@ -22,13 +22,15 @@ from std_msgs.msg import Header
 from msg_adapters.errors import StatusMessageError
 from msg_adapters.status import (
     diagnoses_from_message, Diagnosis, FrameStatus, FrameTimes, Level, message_from_diagnoses,
-    message_from_status, Reading, status_from_message)
+    message_from_status, message_from_statuses, Reading, status_from_message,
+    statuses_from_message)
 
 FINITE = st.floats(allow_nan=False, allow_infinity=False)
 STATUSES = st.builds(
     FrameStatus, st.text(), st.integers(0), st.none() | FINITE, FINITE, FINITE, st.integers(0),
     st.sampled_from(Level), st.text(), st.none() | st.builds(FrameTimes, *[FINITE] * 4),
-    st.none() | st.builds(Reading, *[FINITE] * 3), st.none() | st.builds(Reading, *[FINITE] * 3))
+    st.none() | st.builds(Reading, *[FINITE] * 3), st.none() | st.builds(Reading, *[FINITE] * 3),
+    st.sampled_from(['', 'accepted', 'refused']))
 DIAGNOSES = st.builds(Diagnosis, st.text(), st.sampled_from(Level), st.text(),
                       st.dictionaries(st.text(), st.text()), st.text())
 
@@ -36,6 +38,15 @@ DIAGNOSES = st.builds(Diagnosis, st.text(), st.sampled_from(Level), st.text(),
 @given(STATUSES)
 def test_frame_status_round_trip(status):
     assert status_from_message(message_from_status(status, 'node')) == status
+
+
+@given(st.lists(STATUSES, min_size=1))
+def test_statuses_of_several_targets_round_trip(statuses):
+    message = message_from_statuses(statuses, 'node')
+    assert statuses_from_message(message) == statuses
+    assert status_from_message(message) == statuses[0]
+    assert [entry.hardware_id for entry in message.status] == [
+        f'target_{status.track_id}' if status.track_id else '' for status in statuses]
 
 
 @given(st.lists(DIAGNOSES))

@@ -44,32 +44,48 @@ PATIENCE = 100.0
 
 class FakeTracker:
     """
-    Moves its box one pixel to the right in every frame.
+    Moves every box one pixel to the right in every frame.
 
-    `states` overrides the state of coming updates, `error` is raised once, `inspect` may raise
-    whatever it thinks of an image, `gate` holds every call until it is set, `calls` tells what
-    happened on which image.
+    `states` overrides the state of coming updates, target by target, `error` is raised once,
+    `inspect` may raise whatever it thinks of an image, `gate` holds every call until it is set,
+    `calls` tells what happened on which image.
     """
 
     def __init__(self):
         self.states, self.error, self.calls, self.times = [], None, [], []
+        self.results, self._started = {}, 0
         self.inspect = lambda image: None
         self.gate = threading.Event()
         self.gate.set()
 
-    def initialize(self, image, box, time):
+    def initialize(self, image, box, time, in_place_of=()):
         self.calls.append(('initialize', image.copy()))
         self.times.append(time)
         self._obey(image)
-        self.box = box
-        return self._result(image, TrackState.TRACKING)
+        for number in in_place_of:
+            self.drop(number)
+        self._started += 1
+        self.results[self._started] = self._result(box, TrackState.TRACKING)
+        return self._started
 
-    def update(self, image, time):
+    def update(self, image, time, only=None):
         self.calls.append(('update', image.copy()))
         self.times.append(time)
         self._obey(image)
-        self.box = BoundingBox(self.box.x + 1, *self.box.as_tuple()[1:])
-        return self._result(image, self.states.pop(0) if self.states else TrackState.TRACKING)
+        moved = {}
+        for number in self.results if only is None else only:
+            box = self.results[number].box
+            moved[number] = self._result(
+                BoundingBox(box.x + 1, *box.as_tuple()[1:]),
+                self.states.pop(0) if self.states else TrackState.TRACKING)
+        self.results.update(moved)
+        return moved
+
+    def drop(self, number):
+        del self.results[number]
+
+    def reset(self):
+        self.results.clear()
 
     def _obey(self, image):
         assert self.gate.wait(PATIENCE)
@@ -78,9 +94,8 @@ class FakeTracker:
         if error is not None:
             raise error
 
-    def _result(self, image, state):
-        scores = np.full((4, 4), 0.5, np.float32)
-        return TrackResult(self.box, 0.75, state, scores, self.box)
+    def _result(self, box, state):
+        return TrackResult(box, 0.75, state, np.full((4, 4), 0.5, np.float32), box)
 
 
 class Graph:

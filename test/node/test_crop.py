@@ -63,7 +63,7 @@ def test_node_cuts_edges_and_speaks_of_the_full_image(run):
     assert running.last_box == (20, 12, 8, 6)
     (call, seen), = running.fake.calls
     np.testing.assert_array_equal(seen, pixels[2:-4, 3:-5])
-    assert running.fake.box.as_tuple() == (17, 10, 8, 6)
+    assert running.fake.results[1].box.as_tuple() == (17, 10, 8, 6)
     running.graph.spin_until(lambda: maps and overlays)
     confidence = image_from_message(maps[0])
     assert confidence.shape == (48, 64)

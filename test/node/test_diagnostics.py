@@ -19,7 +19,8 @@ import numpy as np
 import pytest
 
 from lmsco_ros.core.types import BoundingBox, TrackResult, TrackState
-from lmsco_ros.node.diagnostics import frame_status, HealthMonitor, Problem, refused_status
+from lmsco_ros.node.diagnostics import (
+    frame_statuses, HealthMonitor, Problem, Readings, refused_status)
 from lmsco_ros.node.outcome import Outcome, PendingFrame, Phase
 from msg_adapters.status import Level, Reading
 
@@ -35,11 +36,11 @@ class Clock:
         return self.now
 
 
-def outcome(phase=Phase.TRACKED, state=TrackState.TRACKING, *, live=True, error=''):
-    result = TrackResult(BOX, 0.5, state, np.zeros((2, 2), np.float32), BOX) \
-        if phase is Phase.TRACKED else None
+def outcome(phase=Phase.TRACKED, state=TrackState.TRACKING, *, live=True, error='', **more):
+    result = TrackResult(BOX, 0.5, state, np.zeros((2, 2), np.float32), BOX)
     frame = PendingFrame(None, 0, 0.0)
-    return Outcome(frame, phase, result, 3, live, error, 0.006, 0.010)
+    return Outcome(frame, phase, {3: result} if phase is Phase.TRACKED else {}, 3, live, error,
+                   0.006, 0.010, **more)
 
 
 def report(monitor, **values):
@@ -105,12 +106,13 @@ def test_level_and_message_tell_what_is_wrong():
     (outcome(Phase.FAILED, error='why'), 'failed', Level.ERROR),
 ])
 def test_frame_status_tells_state_and_figures(given, state, level):
-    status = frame_status(given, 7, 0.012, target=Reading(1, 2, 3))
+    status, = frame_statuses(given, 7, 0.012, lambda result: Readings(Reading(1, 2, 3)))
     assert (status.state, status.level, status.track_id, status.dropped_frames) == (
         state, level, 3, 7)
     assert (status.latency_ms, status.tracker_ms) == (12, pytest.approx(4))
     assert np.diff(status.times) == pytest.approx([0.006, 0.004, 0.002], abs=1e-5)
-    assert (status.target, status.target_celsius) == (Reading(1, 2, 3), None)
+    seen = given.result is not None and state != 'lost'
+    assert (status.target, status.target_celsius) == (Reading(1, 2, 3) if seen else None, None)
     assert status.score == (0.5 if given.result else None)
     assert status.message and (not given.error or status.message == 'why')
 

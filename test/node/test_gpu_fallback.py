@@ -45,6 +45,12 @@ def calls(fake):
     return [(name, int(seen[0, 0])) for name, seen in fake.calls]
 
 
+def started(tracker, frame):
+    """Start on a target, and return its box."""
+    number = tracker.initialize(frame, BOX, 1.0)
+    return tracker.results[number].box
+
+
 def test_goes_on_from_the_last_frame_that_showed_the_target(bench):
     tracker, fakes, warnings = bench
     tracker.initialize(image(0), BOX, 1.0)
@@ -52,7 +58,7 @@ def test_goes_on_from_the_last_frame_that_showed_the_target(bench):
     tracker.update(image(1), 2.0)
     tracker.update(image(2), 2.0)
     fakes['cuda'].error = OutOfMemory('2 GiB are missing')
-    result = tracker.update(image(3), 2.0)
+    result = tracker.update(image(3), 2.0)[1]
     assert calls(fakes['cpu']) == [('initialize', 1), ('update', 3)]
     # The box of frame 1 is one pixel right of the first, and frame 3 moves it once more.
     assert result.box == BoundingBox(3, 2, 3, 4)
@@ -60,6 +66,37 @@ def test_goes_on_from_the_last_frame_that_showed_the_target(bench):
     assert 'processor' in warning and '2 GiB are missing' in warning
     tracker.initialize(image(4), BOX, 1.0)
     assert calls(fakes['cpu'])[-1] == ('initialize', 4)
+
+
+def test_all_targets_go_on_under_their_numbers(bench):
+    """Each from the frame that it was seen in last; the new tracker counts from 1 again."""
+    tracker, fakes, _ = bench
+    places = [BoundingBox(10 * number, 2, 3, 4) for number in range(4)]
+    assert [tracker.initialize(image(0), box, 1.0) for box in places] == [1, 2, 3, 4]
+    tracker.drop(1)
+    assert tracker.initialize(image(1), BOX, 1.0, in_place_of=(4,)) == 5
+    fakes['cuda'].states = [TrackState.LOST, TrackState.TRACKING, TrackState.TRACKING]
+    assert set(tracker.update(image(2), 2.0)) == {2, 3, 5}
+    fakes['cuda'].error = OutOfMemory()
+    results = tracker.update(image(3), 2.0, only=(3, 5))
+    assert calls(fakes['cpu']) == [('initialize', 0), ('initialize', 2), ('initialize', 2),
+                                   ('update', 3)]
+    assert {number: result.box.x for number, result in results.items()} == {3: 22, 5: 3}
+    assert set(tracker.results) == {2, 3, 5} and tracker.results[2].box == places[1]
+    tracker.drop(3)
+    assert tracker.initialize(image(4), BOX, 1.0, in_place_of=(2,)) == 6
+    assert set(tracker.update(image(5), 2.0)) == {5, 6}
+    tracker.reset()
+    assert tracker.results == {} and tracker.initialize(image(6), BOX, 1.0) == 7
+
+
+def test_start_beside_others_is_repeated_on_the_processor(bench):
+    tracker, fakes, _ = bench
+    tracker.initialize(image(0), BoundingBox(9, 2, 3, 4), 1.0)
+    fakes['cuda'].error = OutOfMemory()
+    assert tracker.initialize(image(1), BOX, 1.0) == 2
+    assert calls(fakes['cpu']) == [('initialize', 0), ('initialize', 1)]
+    assert {number: result.box.x for number, result in tracker.results.items()} == {1: 9, 2: 1}
 
 
 def test_times_go_with_the_frames(bench):
@@ -98,7 +135,7 @@ def test_nothing_of_a_frame_is_kept(make_fake, device):
 def test_start_is_repeated_on_the_processor(bench):
     tracker, fakes, warnings = bench
     fakes['cuda'].error = OutOfMemory()
-    assert tracker.initialize(image(7), BOX, 1.0).box == BOX
+    assert started(tracker, image(7)) == BOX
     assert calls(fakes['cpu']) == [('initialize', 7)] and len(warnings) == 1
 
 
@@ -111,7 +148,7 @@ def test_tracker_that_does_not_fit_is_made_on_the_processor(make_fake):
             raise OutOfMemory
         return make_fake()
     tracker = FallbackTracker(make, '', warnings.append)
-    assert tracker.initialize(image(0), BOX, 1.0).box == BOX
+    assert started(tracker, image(0)) == BOX
     assert devices == ['', 'cpu'] and len(warnings) == 1
 
 
@@ -127,7 +164,7 @@ def test_no_memory_anywhere_and_other_errors_are_raised(bench):
     fakes['cpu'].error = OutOfMemory('nor now')
     with pytest.raises(OutOfMemory, match='nor now'):
         tracker.initialize(image(3), BOX, 1.0)
-    assert tracker.initialize(image(4), BOX, 1.0).box == BOX
+    assert started(tracker, image(4)) == BOX
 
 
 def test_node_goes_on_and_warns_until_it_is_configured_again(run, make_fake):

@@ -15,11 +15,15 @@
 
 """The node with the tracker that it is made for."""
 
+from types import SimpleNamespace
+
+from geometry_msgs.msg import PolygonInstanceStamped
 import numpy as np
 import pytest
 from sensor_msgs.msg import Image
 
 from lmsco_ros.node.tracker_factory import make_tracker
+from msg_adapters.boxes import box_from_polygon
 
 SHAPE = (96, 128)
 
@@ -47,6 +51,31 @@ def test_warm_target_is_followed(run):
         x, y, width, height = running.last_box
         assert x + width / 2 == pytest.approx(40.5 + 2 * number, abs=2)
         assert y + height / 2 == pytest.approx(40.5 + number, abs=2)
+
+
+def test_two_targets_are_followed(run):
+    """They look the same; the second is started while the first is followed."""
+    running = run(tracker_factory=make_tracker, max_targets=2)
+    boxes = running.graph.listen(PolygonInstanceStamped, 'lmsco_tracker/boxes')
+
+    def both(number):
+        message = _image(running.graph, number)
+        pixels = np.frombuffer(message.data, np.uint16).reshape(SHAPE)
+        np.maximum(pixels, np.roll(_scene(20 - number), 20, axis=0), out=pixels)
+        return message
+    running.start(30, 30, 20, 20)
+    running.send(both(0))
+    running.start(70, 70, 20, 20)
+    images = [both(number) for number in range(1, 21)]
+    last = running.send(*images)
+    running.graph.spin_until(lambda: sum(
+        box.header == images[-1].header for box in boxes) >= 2)
+    found = {box.polygon.id: box_from_polygon(SimpleNamespace(polygon=box.polygon.polygon))
+             for box in boxes if box.header == images[-1].header}
+    assert last.state == 'tracking' and set(found) == {1, 2}
+    for number, (x, y) in {1: (80.5, 60.5), 2: (40.5, 60.5)}.items():
+        left, top, width, height = found[number]
+        assert (left + width / 2, top + height / 2) == pytest.approx((x, y), abs=2)
 
 
 def test_refused_box_is_reported_and_costs_nothing(run):

@@ -51,14 +51,14 @@ STUCK_TRACKER = """
     del sys.modules['lmsco_ros.node.run']
     from lmsco_ros.node import run as real
 
-    def initialize(image, box, time):
+    def initialize(image, box, time, in_place_of):
         print('stuck', flush=True)
         while True:
             pass
 
     TrackerNode = real.TrackerNode
     real.TrackerNode = lambda: TrackerNode(
-        tracker_factory=lambda settings: Mock(initialize=initialize))
+        tracker_factory=lambda settings: Mock(initialize=initialize, results={}))
     return real.run(arguments, ending)
 """
 

@@ -225,7 +225,7 @@ def test_confidence_map_is_aligned_and_computed_on_demand(running, monkeypatch):
 
 
 def test_overlay_shows_the_box_and_is_drawn_on_demand(running, monkeypatch):
-    monkeypatch.setattr('lmsco_ros.node.outputs.draw_overlay',
+    monkeypatch.setattr('lmsco_ros.node.outputs.draw_targets',
                         lambda *args, **kwargs: pytest.fail('nobody listens'))
     assert running.send().state == 'idle'
     monkeypatch.undo()
@@ -268,8 +268,8 @@ def test_detections_are_empty_without_a_box(run, monkeypatch):
     listener = Mock(publish=detections.append, get_subscription_count=lambda: 1)
     monkeypatch.setattr('lmsco_ros.node.outputs.Outputs._detections_publisher',
                         lambda self, made: listener)
-    monkeypatch.setattr('lmsco_ros.node.outputs.detections_from_box',
-                        lambda box, **values: (box, values))
+    monkeypatch.setattr('lmsco_ros.node.outputs.detections_from_boxes',
+                        lambda boxes, header: (boxes, header))
     running = run()
     running.send()
     running.start(10, 12, 8, 6)
@@ -278,9 +278,9 @@ def test_detections_are_empty_without_a_box(run, monkeypatch):
     images = [running.graph.image(), running.graph.image()]
     running.send(*images)
     running.graph.spin_until(lambda: len(detections) == 4)
-    assert [box for box, _ in detections] == [
-        None, (10, 12, 8, 6), (11, 12, 8, 6), None]
-    assert detections[2][1] == {'track_id': '1', 'score': 0.75, 'header': images[0].header}
+    assert [boxes for boxes, _ in detections] == [
+        [], [((10, 12, 8, 6), '1', 0.75, 'target')], [((11, 12, 8, 6), '1', 0.75, 'target')], []]
+    assert detections[2][1] == images[0].header
 
 
 @pytest.mark.skipif(not detections_available(), reason='vision_msgs is not installed')

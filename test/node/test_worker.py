@@ -15,6 +15,7 @@
 
 """The worker keeps the order, bounds the delay, and survives its tracker; no ROS."""
 
+from dataclasses import replace
 from pathlib import Path
 import subprocess
 import sys
@@ -28,6 +29,7 @@ import pytest
 
 from lmsco_ros.core.errors import ImageError
 from lmsco_ros.core.types import BoundingBox, TrackResult, TrackState
+from lmsco_ros.node.followed_targets import FollowedTargets
 from lmsco_ros.node.history import FrameHistory
 from lmsco_ros.node.mailbox import BoundedMailbox, LatestMailbox
 from lmsco_ros.node.outcome import PendingFrame, Phase
@@ -58,36 +60,53 @@ class Recorder:
 
     def __init__(self):
         self.calls, self.times, self.error = [], [], None
+        self.results, self.count, self.state = {}, 0, TrackState.TRACKING
         self.gate = threading.Event()
         self.gate.set()
         self.entered = threading.Event()
 
-    def initialize(self, image, box, time):
+    def initialize(self, image, box, time, in_place_of=()):
         self.times.append(time)
-        return self._answer('initialize', image, box)
+        self._answer('initialize', image)
+        for number in in_place_of:
+            self.drop(number)
+        self.count += 1
+        self.results[self.count] = self._result(box)
+        return self.count
 
-    def update(self, image, time):
+    def update(self, image, time, only=None):
         self.times.append(time)
-        return self._answer('update', image, BOX)
+        self._answer('update', image)
+        return {number: self._result(result.box) for number, result in self.results.items()
+                if only is None or number in only}
 
-    def _answer(self, call, image, box):
+    def drop(self, number):
+        del self.results[number]
+
+    def reset(self):
+        self.results = {}
+
+    def _answer(self, call, image):
         self.calls.append((call, int(image[0, 0])))
         self.entered.set()
         assert self.gate.wait(PATIENCE)
         error, self.error = self.error, None
         if error:
             raise error
-        return TrackResult(box, 1.0, TrackState.TRACKING, np.zeros((2, 2), np.float32), box)
+
+    def _result(self, box):
+        return TrackResult(box, 1.0, self.state, np.zeros((2, 2), np.float32), box)
 
 
 class Bench:
     """A worker, its tracker and what it delivered."""
 
-    def __init__(self, mailbox=None, seconds=10.0, frames=100, nbytes=10 ** 6):
+    def __init__(self, mailbox=None, seconds=10.0, frames=100, nbytes=10 ** 6, **targets):
         self.tracker, self.outcomes, self.faults = Recorder(), [], []
         self.changed = threading.Condition()
         self.worker = TrackerWorker(
-            self.tracker, self._deliver, mailbox=LatestMailbox() if mailbox is None else mailbox,
+            FollowedTargets(self.tracker, **targets), self._deliver,
+            mailbox=LatestMailbox() if mailbox is None else mailbox,
             history=FrameHistory(seconds, frames, nbytes),
             on_fault=lambda work, error: self.faults.append((work, error)))
         self.worker.start()
@@ -224,8 +243,8 @@ def test_stop_frees_the_images(bench):
 
 
 def test_stop_before_start_and_twice():
-    worker = TrackerWorker(Recorder(), print, mailbox=LatestMailbox(), on_fault=print,
-                           history=FrameHistory(1.0, 1, 1))
+    worker = TrackerWorker(FollowedTargets(Recorder()), print, mailbox=LatestMailbox(),
+                           on_fault=print, history=FrameHistory(1.0, 1, 1))
     assert worker.stop() and worker.stop()
 
 
@@ -597,6 +616,249 @@ def test_refused_request_keeps_the_target(bench):
     assert b.wait(2).phase is Phase.REFUSED
     b.frame(6)
     assert b.wait(3).phase is Phase.TRACKED
+
+
+def boxes(outcome):
+    """Return where the targets of an outcome are, by their numbers."""
+    return {number: result.box.x for number, result in outcome.results.items()}
+
+
+def at(x):
+    """Return a box."""
+    return BoundingBox(x, 2, 3, 4)
+
+
+def test_several_targets_are_started_and_followed_together(bench):
+    b = bench(most=3)
+    for x in (1, 2, 3):
+        b.worker.initialize(at(x))
+    b.frame(0)
+    b.wait(3)
+    # The first answers the frame; the others start on the same one, behind it.
+    assert [(o.live, boxes(o), o.track_id, o.start.number) for o in b.outcomes] == [
+        (True, {1: 1}, 1, 1), (False, {2: 2}, 2, 2), (False, {3: 3}, 3, 3)]
+    b.frame(1)
+    outcome = b.wait(4)
+    assert boxes(outcome) == {1: 1, 2: 2, 3: 3} and outcome.start is None
+    assert b.tracker.calls == [('initialize', 0)] * 3 + [('update', 1)]
+    assert tuple(b.worker.results) == (1, 2, 3)
+
+
+def test_start_on_a_coming_frame_leaves_it_to_the_others_as_well(bench):
+    b = bench(most=2)
+    b.worker.initialize(at(1))
+    b.frame(0)
+    b.wait(1)
+    b.worker.initialize(at(2), SECOND)
+    b.frame(1)
+    outcome = b.wait(2)
+    assert (outcome.live, boxes(outcome), outcome.track_id) == (True, {1: 1, 2: 2}, 2)
+    assert b.tracker.calls[1:] == [('update', 1), ('initialize', 1)]
+
+
+def test_start_beyond_the_most_takes_the_place_of_the_selected_one(bench):
+    b = bench(most=2)
+    for number, x in enumerate((1, 2, 3)):
+        b.worker.initialize(at(x))
+        b.frame(number)
+        b.wait_for(lambda outcome: outcome.frame.stamp == number * SECOND)
+    b.wait_for(lambda outcome: outcome.start and outcome.start.number == 3)
+    assert tuple(b.worker.results) == (1, 3)
+    b.worker.select(1)
+    b.worker.initialize(at(4))
+    started = b.wait_for(lambda outcome: outcome.start and outcome.start.number == 4)
+    assert started.start.replaced == (1,) and tuple(b.worker.results) == (3, 4)
+    b.frame(9)
+    outcome = b.wait_for(lambda outcome: outcome.frame.stamp == 9 * SECOND)
+    # The latest is selected again.
+    assert boxes(outcome) == {3: 3, 4: 4} and outcome.track_id == 4
+
+
+def test_start_beyond_the_most_takes_the_place_of_the_one_lost_longest(bench):
+    b = bench(most=3)
+    for x in (1, 2, 3):
+        b.worker.initialize(at(x))
+    b.frame(0)
+    b.wait(3)
+    states = {1: TrackState.TRACKING, 2: TrackState.TRACKING, 3: TrackState.LOST}
+    update = b.tracker.update
+    b.tracker.update = lambda image, time, only=None: {
+        number: replace(result, state=states[number])
+        for number, result in update(image, time, only).items()}
+    b.frame(1)
+    b.wait(4)
+    states[2] = TrackState.LOST
+    b.frame(2)
+    b.wait(5)
+    b.worker.select(1)
+    b.worker.initialize(at(4))
+    assert b.wait(6).start.replaced == (3,)
+
+
+def test_offer_that_is_not_wanted_any_more_is_a_plain_frame(bench):
+    b = bench(most=2)
+    b.worker.initialize(at(1))
+    b.frame(0)
+    b.wait(1)
+    asked = []
+    b.worker.offer(at(2), SECOND, lambda results: asked.append(dict(results)))
+    b.frame(1)
+    assert boxes(b.wait(2)) == {1: 1} and b.wait(2).start is None
+    b.worker.offer(at(2), None, lambda results: asked.append(dict(results)))
+    b.frame(2)
+    assert boxes(b.wait(3)) == {1: 1} and len(b.outcomes) == 3
+    assert [set(results) for results in asked] == [{1}, {1}]
+    b.worker.offer(at(2), None, lambda results: True)
+    assert b.wait(4).start.accepted
+
+
+def test_selected_target_is_the_one_that_an_outcome_speaks_of(bench):
+    b = bench(most=3)
+    for x in (1, 2, 3):
+        b.worker.initialize(at(x))
+    b.frame(0)
+    b.wait(3)
+    b.worker.select(2)
+    b.frame(1)
+    assert (b.wait(4).track_id, b.wait(4).result.box.x) == (2, 2)
+    assert b.worker.track_id == 2
+
+
+def test_refused_start_leaves_the_others_as_they_are(bench):
+    b = bench(most=2)
+    b.worker.initialize(at(1))
+    b.frame(0)
+    b.wait(1)
+    b.worker.initialize(at(2), SECOND)
+    initialize = b.tracker.initialize
+
+    def refuse(image, box, time, in_place_of):
+        b.tracker.initialize = initialize
+        raise ImageError('nothing to see')
+    b.tracker.initialize = refuse
+    b.frame(1)
+    outcome = b.wait(2)
+    assert (outcome.phase, boxes(outcome), outcome.track_id) == (Phase.TRACKED, {1: 1}, 1)
+    assert not outcome.start.accepted and outcome.start.reason == outcome.error
+    assert outcome.error == 'nothing to see' and outcome.refused
+    b.frame(2)
+    assert boxes(b.wait(3)) == {1: 1}
+
+
+def test_late_target_catches_up_alone(bench):
+    b = bench(most=2)
+    b.worker.initialize(at(1))
+    b.frames(range(5))
+    before = len(b.outcomes)
+    b.worker.initialize(at(2), 2 * SECOND)
+    b.wait(before + 3)
+    late = b.outcomes[before:]
+    assert [(o.live, o.frame.stamp // SECOND, boxes(o), o.track_id) for o in late] == [
+        (False, 2, {2: 2}, 2), (False, 3, {2: 2}, 2), (False, 4, {2: 2}, 2)]
+    b.frame(5)
+    assert boxes(b.wait(before + 4)) == {1: 1, 2: 2}
+
+
+def test_refused_late_start_does_not_let_the_others_go_through_old_frames(bench):
+    b = bench(most=2)
+    b.worker.initialize(at(1))
+    b.frames(range(5))
+    before, calls = len(b.outcomes), len(b.tracker.calls)
+    b.tracker.error = ImageError('nothing to see')
+    b.worker.initialize(at(2), 2 * SECOND)
+    assert b.wait(before + 1).error == 'nothing to see'
+    b.frame(5)
+    b.wait(before + 2)
+    assert b.tracker.calls[calls:] == [('initialize', 2), ('update', 5)]
+
+
+def test_late_target_that_is_replaced_does_not_go_on_catching_up(bench):
+    b = bench(BoundedMailbox(50, int))
+    b.frames(range(5))
+    b.hold()
+    b.worker.initialize(at(1), 2 * SECOND)
+    b.stuck()
+    b.frame(5)
+    b.worker.initialize(at(2))
+    b.tracker.gate.set()
+    b.frame(6)
+    outcome = b.wait_for(lambda outcome: outcome.frame.stamp == 6 * SECOND)
+    assert boxes(outcome) == {2: 2}
+
+
+def test_waiting_starts_are_as_many_as_there_may_be_targets(bench):
+    mailbox = LatestMailbox()
+    b = bench(mailbox, most=3)
+    b.frame(0)
+    b.wait(1)
+    b.worker.initialize(at(0))
+    b.hold()
+    b.frame(1)
+    b.stuck()
+    for x in range(1, 100):
+        b.worker.initialize(at(x))
+        b.worker.initialize(at(x), 90 * SECOND)
+    assert len(mailbox) <= 3
+    b.frame(90)
+    b.tracker.gate.set()
+    b.wait_for(lambda outcome: outcome.start and outcome.start.number == b.tracker.count
+               and outcome.frame.stamp == 90 * SECOND)
+    assert b.tracker.count <= 5
+
+
+@pytest.mark.parametrize('drop_after, left', [(2.0, ()), (9.0, (1, 2)), (0.0, (1, 2))])
+def test_target_that_is_lost_for_too_long_is_dropped(bench, drop_after, left):
+    b = bench(most=2, drop_after=drop_after)
+    b.worker.initialize(at(1))
+    b.worker.initialize(at(2))
+    b.frames([0])
+    b.wait(2)
+    b.tracker.state = TrackState.LOST
+    for number in (1, 2, 3, 4):
+        b.frame(number)
+        outcome = b.wait(number + 2)
+        assert boxes(outcome) == {1: 1, 2: 2}
+    # Lost since 1 s, and at 4 s for more than two seconds.
+    assert outcome.dropped == tuple(sorted({1, 2} - set(left)))
+    assert tuple(b.worker.results) == left and set(b.tracker.results) == set(left)
+    b.frame(5)
+    assert b.wait(7).phase is (Phase.TRACKED if left else Phase.IDLE)
+
+
+def test_target_that_was_found_again_is_lost_anew(bench):
+    b = bench(drop_after=2.0)
+    b.worker.initialize(at(1))
+    b.frame(0)
+    b.wait(1)
+    for number, state in enumerate((TrackState.LOST, TrackState.LOST, TrackState.UNCERTAIN,
+                                    TrackState.LOST, TrackState.LOST, TrackState.LOST), 1):
+        b.tracker.state = state
+        b.frame(number)
+        assert b.wait(number + 1).dropped == ()
+    b.frame(7)
+    assert b.wait(8).dropped == (1,)
+
+
+def test_time_that_begins_anew_drops_nothing_at_once(bench):
+    b = bench(drop_after=2.0)
+    b.worker.initialize(at(1))
+    b.frame(100)
+    b.wait(1)
+    b.tracker.state = TrackState.LOST
+    for count, number in enumerate((101, 1, 2, 3)):
+        b.frame(number)
+        assert b.wait(count + 2).dropped == ()
+    b.frame(4)
+    assert b.wait(6).dropped == (1,)
+
+
+def test_new_worker_begins_without_the_targets_of_the_one_before(bench):
+    tracker = Recorder()
+    tracker.initialize(np.zeros((2, 2), int), BOX, 0.0)
+    b = bench()
+    b.worker._targets._tracker = tracker
+    b.frame(0)
+    assert b.wait(1).phase is Phase.IDLE and not tracker.results
 
 
 STAMPS = st.lists(st.integers(0, 30), min_size=1, max_size=30)

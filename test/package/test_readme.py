@@ -85,7 +85,8 @@ def test_topic_table_is_the_interface_of_the_node(node, direction):
     """Every documented topic is offered with its type, and none is left out."""
     documented = documented_names(node, [row for row in table('Topics') if row[1] == direction])
     if importlib.util.find_spec('vision_msgs') is None:
-        documented.pop(node.resolve_topic_name('~/detections'), None)
+        for name in ('~/detections', 'init_detections'):
+            documented.pop(node.resolve_topic_name(name), None)
     query = (node.get_subscriber_names_and_types_by_node if direction == 'in'
              else node.get_publisher_names_and_types_by_node)
     offered = offered_names(query, node, documented)

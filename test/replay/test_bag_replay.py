@@ -38,14 +38,21 @@ BOX, STATUS = '/lmsco_tracker/box', '/lmsco_tracker/status'
 class Follower:
     """Says the value of the image as x; fails at an image with the value 99."""
 
-    def initialize(self, image, box, time):
-        return self.update(image, time)
+    def __init__(self):
+        self.results = {}
 
-    def update(self, image, time):
+    def initialize(self, image, box, time, in_place_of=()):
+        self.results = self.update(image, time)
+        return 1
+
+    def update(self, image, time, only=None):
         if image[0, 0] == 99:
             raise RuntimeError('the tracker fails')
         box = BoundingBox(float(image[0, 0]), 1, 2, 2)
-        return TrackResult(box, 0.5, TrackState.TRACKING, np.ones((4, 4), np.float32), box)
+        return {1: TrackResult(box, 0.5, TrackState.TRACKING, np.ones((4, 4), np.float32), box)}
+
+    def reset(self):
+        self.results = {}
 
 
 @pytest.fixture

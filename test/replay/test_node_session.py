@@ -38,19 +38,23 @@ class Follower:
     """Says the brightness of the image's first pixel as x; counts what it saw."""
 
     def __init__(self, gate=None):
-        self.seen = []
+        self.seen, self.results = [], {}
         self.gate = gate
 
-    def initialize(self, image, box, time):
+    def initialize(self, image, box, time, in_place_of=()):
         if box.x > 60:
             raise BoxError('the box is outside of the image')
-        return self._result(image, box)
+        self.results = {1: self._result(image, box)}
+        return 1
 
-    def update(self, image, time):
+    def update(self, image, time, only=None):
         if self.gate is not None:
             self.gate.wait(100)
         state = TrackState.LOST if image[0, 0] == 255 else TrackState.TRACKING
-        return self._result(image, BoundingBox(float(image[0, 0]), 6, 10, 12), state)
+        return {1: self._result(image, BoundingBox(float(image[0, 0]), 6, 10, 12), state)}
+
+    def reset(self):
+        self.results = {}
 
     def _result(self, image, box, state=TrackState.TRACKING):
         self.seen.append(int(image[0, 0]))

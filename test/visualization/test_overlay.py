@@ -20,7 +20,7 @@ import pytest
 
 from lmsco_ros.core.errors import ImageError
 from lmsco_ros.core.types import BoundingBox, TrackResult, TrackState
-from lmsco_ros.visualization import DisplayRange, draw_overlay, state_color
+from lmsco_ros.visualization import DisplayRange, draw_overlay, draw_targets, state_color
 
 
 def result_of(state=TrackState.TRACKING, box=BoundingBox(60, 50, 40, 30), score=0.8):
@@ -69,6 +69,37 @@ def test_box_edges_lie_on_the_box():
 def test_state_decides_the_color(state):
     canvas = draw_overlay(scene(), result_of(state, BoundingBox(60.5, 50.5, 40, 30)))
     assert state_seen_along(canvas[50, 60:100]) is state
+
+
+def test_one_target_is_drawn_as_ever():
+    one = draw_targets(scene(), {3: result_of()}, 3, label='frame 3')
+    np.testing.assert_array_equal(one, draw_overlay(scene(), result_of(), label='frame 3'))
+    np.testing.assert_array_equal(draw_targets(scene(), {}, 0), draw_overlay(scene(), None))
+
+
+def test_several_targets_are_told_apart_by_their_numbers():
+    """The selected one has score and state in the corner, the other one its color and number."""
+    other = result_of(TrackState.UNCERTAIN, BoundingBox(110.5, 70.5, 20, 20))
+    results, image = {1: result_of(), 2: other}, np.zeros((120, 160), np.uint8)
+    canvas = draw_targets(image, results, 1)
+    alone = draw_overlay(image, result_of())
+    changed = (canvas != alone).any(-1)
+    assert state_seen_along(canvas[70, 112:128]) is TrackState.UNCERTAIN
+    # Numbers are written below both boxes, and nothing else has changed.
+    assert changed[81:95, 60:75].any() and changed[91:105, 110:125].any()
+    changed[68:106, 108:134] = changed[79:96, 58:78] = False
+    assert not changed.any()
+    swapped = draw_targets(image, {7: result_of(), 2: other}, 7)
+    assert (swapped[81:95, 60:75] != canvas[81:95, 60:75]).any()
+
+
+@pytest.mark.parametrize('box', [(-30, -30, 40, 40), (140, 110, 60, 60), (150, -5, 30, 300)])
+def test_number_of_a_box_that_leaves_the_image_is_seen(box):
+    image, results = np.zeros((120, 160), np.uint8), {1: result_of(), 2: result_of(
+        box=BoundingBox(*box))}
+    two, hidden = (draw_targets(image, {**results, number: results[2]}, 1)
+                   for number in (2, 3))
+    assert (two != hidden).any()
 
 
 def test_lost_box_is_dashed():
