@@ -92,7 +92,7 @@ def _track(scene: Sequence[SceneFrame], parameters: dict[str, str], outputs: Run
     from lmsco_ros.replay.scene_run import SceneRun
 
     def write_row(item: TrackedFrame) -> None:
-        outputs.add_row(item.frame.index, item.frame.stamp_ns, item.result)
+        outputs.add_rows(item.frame.index, item.frame.stamp_ns, {1: item.result})
 
     task = progress.add_task('tracking', total=len(scene))
     run = SceneRun(scene, on_sent=lambda: progress.advance(task), on_answer=write_row)
@@ -103,7 +103,7 @@ def _track(scene: Sequence[SceneFrame], parameters: dict[str, str], outputs: Run
         for item in progress.track(tracked, description='writing'):
             frame = item.frame
             outputs.add_picture(RecordedFrame(frame.index, frame.stamp_ns, frame.image),
-                                item.result, frame.box)
+                                {1: item.result}, frame.box)
     return tracked
 
 

@@ -23,12 +23,12 @@ from types import TracebackType
 
 from lmsco_ros.core.types import TrackResult, TrackState
 
-COLUMNS = ('frame', 'stamp', 'x', 'y', 'width', 'height', 'score', 'state')
+COLUMNS = ('frame', 'stamp', 'x', 'y', 'width', 'height', 'score', 'state', 'id')
 
 
 class BoxesFile:
     """
-    One row a frame; use as a context manager.
+    One row for each target and frame; use as a context manager.
 
     While the target is lost the row has no box, so that nobody takes the last trusted
     one for a measurement. A row is in the file, and whole, once `add` returns: neither a
@@ -70,14 +70,14 @@ class BoxesFile:
         except OSError as late:
             raise OSError(late.errno, late.strerror, str(self._path)) from late
 
-    def add(self, index: int, stamp_ns: int, result: TrackResult) -> None:
-        """Write the row of frame `index`; stamps are written in seconds."""
+    def add(self, index: int, stamp_ns: int, result: TrackResult, number: int = 1) -> None:
+        """Write the row of target `number` in frame `index`; stamps are written in seconds."""
         seconds, nanoseconds = divmod(stamp_ns, 1_000_000_000)
         box = [''] * 4
         if result.state is not TrackState.LOST:
             box = [f'{value:.3f}' for value in result.box.as_tuple()]
         self._append([index, f'{seconds}.{nanoseconds:09d}', *box,
-                      f'{result.score:.4f}', result.state.value])
+                      f'{result.score:.4f}', result.state.value, number])
         self.rows += 1
 
     def _append(self, values: list[object] | tuple[str, ...]) -> None:

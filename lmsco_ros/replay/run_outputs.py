@@ -16,7 +16,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, ExitStack, suppress
 import os
 from pathlib import Path
@@ -103,29 +103,42 @@ class RunOutputs:
         files = ', '.join([f'{TABLE} with {self._boxes.rows} rows', *pictures])
         return f'kept in {self.folder}: {files}'
 
-    def add(self, frame: RecordedFrame, result: TrackResult,
+    def add(self, frame: RecordedFrame, results: Mapping[int, TrackResult],
             truth: BoundingBox | None = None) -> None:
-        """Append one frame with what the tracker said and, where known, the truth."""
-        self.add_row(frame.index, frame.stamp_ns, result)
-        self.add_picture(frame, result, truth)
+        """
+        Append one frame.
 
-    def add_row(self, index: int, stamp_ns: int, result: TrackResult) -> None:
+        Parameters
+        ----------
+        frame : RecordedFrame
+            The frame.
+        results : mapping of int to TrackResult
+            What the tracker said of each target, by its number; the summary shows the first.
+        truth : BoundingBox, optional
+            Where the first one was.
+
+        """
+        self.add_rows(frame.index, frame.stamp_ns, results)
+        self.add_picture(frame, results, truth)
+
+    def add_rows(self, index: int, stamp_ns: int, results: Mapping[int, TrackResult]) -> None:
         """Append what the tracker said about one frame to the table alone."""
         with _told():
             if self._boxes is None:
                 self._make_room()
                 self._boxes = self._open.enter_context(BoxesFile(self.folder / TABLE))
-            self._boxes.add(index, stamp_ns, result)
+            for number, result in results.items():
+                self._boxes.add(index, stamp_ns, result, number)
 
-    def add_picture(self, frame: RecordedFrame, result: TrackResult,
+    def add_picture(self, frame: RecordedFrame, results: Mapping[int, TrackResult],
                     truth: BoundingBox | None = None) -> None:
-        """Show a frame, whose row is in the table, in film and summary."""
+        """Show a frame, whose rows are in the table, in film and summary."""
         with _told():
             if self._video is None:
                 film = OverlayVideo(self.folder / FILM, self._fps)
                 self._video = self._open.enter_context(film)
-            view = self._video.add(frame.image, result, label=str(frame.index), truth=truth)
-        self._sheet.add(Moment(frame.index, view, result, truth))
+            view = self._video.add(frame.image, results, label=str(frame.index), truth=truth)
+        self._sheet.add(Moment(frame.index, view, next(iter(results.values())), truth))
         self._shown += 1
 
     def _make_room(self) -> None:

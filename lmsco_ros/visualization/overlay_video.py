@@ -16,6 +16,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 from types import TracebackType
@@ -27,7 +28,7 @@ import numpy.typing as npt
 from lmsco_ros.core.types import BoundingBox, TrackResult
 from lmsco_ros.media.film import FilmWriter
 from lmsco_ros.visualization.display_range import DisplayRange
-from lmsco_ros.visualization.overlay import draw_box, draw_overlay
+from lmsco_ros.visualization.overlay import draw_box, draw_targets
 
 # Below this height text hides much of the scene; small sensors are shown enlarged.
 _COMFORTABLE_HEIGHT = 480
@@ -65,7 +66,7 @@ class OverlayVideo:
         """Finish the film."""
         self._film.close()
 
-    def add(self, image: npt.NDArray, result: TrackResult, *, label: str = '',
+    def add(self, image: npt.NDArray, results: Mapping[int, TrackResult], *, label: str = '',
             truth: BoundingBox | None = None) -> npt.NDArray[np.uint8]:
         """
         Append one frame and return its 8-bit view without drawings.
@@ -74,8 +75,8 @@ class OverlayVideo:
         ----------
         image : ndarray, shape (H, W) or (H, W, 3)
             Frame as it was tracked.
-        result : TrackResult
-            What to draw.
+        results : mapping of int to TrackResult
+            What to draw, by the numbers of the targets; the first one with score and state.
         label : str
             Text for the lower left corner.
         truth : BoundingBox, optional
@@ -91,8 +92,9 @@ class OverlayVideo:
                 cv2.cvtColor(large, cv2.COLOR_GRAY2BGR) if large.ndim == 2 else large.copy(),
                 np.uint8)
             draw_box(large, scaled(truth, factor), _TRUTH_COLOR, thickness=1)
-        canvas = draw_overlay(large, replace(result, box=scaled(result.box, factor)),
-                              label=label)
+        drawn = {number: replace(result, box=scaled(result.box, factor))
+                 for number, result in results.items()}
+        canvas = draw_targets(large, drawn, next(iter(drawn)), label=label)
         self._film.write(canvas)
         return view
 

@@ -83,7 +83,7 @@ def test_killed_process_leaves_its_rows(tracking, tmp_path):
     process.kill()
     process.wait(PATIENCE_SECONDS)
     rows = rows_in(tmp_path / 'run')
-    assert len(rows) > 30 and all(len(row) == 8 for row in rows)
+    assert len(rows) > 30 and all(len(row) == 9 for row in rows)
 
 
 def test_closed_terminal_ends_the_command_as_a_signal_does(tracking, tmp_path):

@@ -20,6 +20,7 @@ import re
 import shutil
 import subprocess
 import sys
+from types import SimpleNamespace
 
 import av
 import cv2
@@ -72,6 +73,90 @@ def test_ground_truth_starts_and_judges(lmsco, tmp_path, scene_folder, truth):
     assert len(rows_of(tmp_path / 'run')) == 6
 
 
+def test_several_targets_have_a_row_each(lmsco, tmp_path, scene_folder, scene, start):
+    """The second one is followed as it is alone."""
+    other = '100,80,20,16'
+    for name, boxes in (('both', (start, other)), ('alone', (other,))):
+        inits = [word for box in boxes for word in ('--init', box)]
+        outcome = lmsco('track', scene_folder, *inits, '--output', tmp_path / name)
+        assert outcome.exit_code == 0, outcome.output
+    rows = rows_of(tmp_path / 'both')
+    assert [(int(row['frame']), row['id']) for row in rows] == [
+        (frame, number) for frame in range(15) for number in '12']
+    overlaps = [box_of(row).overlap(f.box) for row, f in zip(rows[::2], scene)]
+    assert np.mean(overlaps) > 0.5
+    for row, alone in zip(rows[1::2], rows_of(tmp_path / 'alone'), strict=True):
+        assert {**row, 'id': '1'} == alone
+
+
+def test_start_is_a_later_frame(lmsco, tmp_path, scene_folder, scene, truth):
+    box = ','.join(map(str, scene[6].box.as_tuple()))
+    for name, arguments in (('given', ('--init', box)), ('known', ('--ground-truth', truth))):
+        outcome = lmsco('track', scene_folder, *arguments, '--start', 6, '--frames', 4,
+                        '--output', tmp_path / name)
+        assert outcome.exit_code == 0, outcome.output
+        rows = rows_of(tmp_path / name)
+        assert [int(row['frame']) for row in rows] == [6, 7, 8, 9]
+        assert box_of(rows[0]).overlap(scene[6].box) > 0.99
+        assert np.mean([box_of(row).overlap(scene[int(row['frame'])].box) for row in rows]) > 0.5
+    assert 'over 4 frames' in outcome.output
+
+
+def test_ground_truth_without_a_target_in_the_first_frame(lmsco, tmp_path, scene_folder, truth):
+    lines = truth.read_text().splitlines()
+    lines[3] = 'nan,nan,nan,nan'
+    (tmp_path / 'truth.txt').write_text('\n'.join(lines))
+    outcome = lmsco('track', scene_folder, '--ground-truth', tmp_path / 'truth.txt',
+                    '--start', 3, '--output', tmp_path / 'run')
+    assert outcome.exit_code == 2 and 'no target in the first frame' in outcome.words
+
+
+@pytest.fixture
+def window(monkeypatch):
+    """Return a window in which somebody drags `boxes`, and what it has shown."""
+    window = SimpleNamespace(boxes=[], shown=[])
+    monkeypatch.setenv('DISPLAY', ':0')
+    monkeypatch.setattr(cv2, 'getBuildInformation', lambda: '  GUI:      QT5\n')
+    monkeypatch.setattr(cv2, 'destroyAllWindows', lambda: None)
+    monkeypatch.setattr(cv2, 'selectROIs', lambda title, image, showCrosshair: (
+        window.shown.append(image), np.array(window.boxes).reshape(-1, 4))[1])
+    return window
+
+
+def test_targets_are_dragged_in_a_window(lmsco, tmp_path, scene_folder, scene, window):
+    """The image of 128 rows is shown four times as large, in 8 bits."""
+    window.boxes = [[round(4 * value) for value in scene[2].box.as_tuple()], [400, 320, 80, 64]]
+    outcome = lmsco('track', scene_folder, '--select', '--start', 2, '--output', tmp_path / 'run')
+    assert outcome.exit_code == 0, outcome.output
+    shown, = window.shown
+    assert shown.shape[:2] == (512, 640) and shown.dtype == np.uint8
+    rows = rows_of(tmp_path / 'run')
+    assert len(rows) == 26 and rows[0]['frame'] == '2'
+    assert box_of(rows[0]).overlap(scene[2].box) > 0.9
+    assert box_of(rows[1]) == BoundingBox(100, 80, 20, 16)
+
+
+def broken_window(*arguments, **options):
+    raise cv2.error('cannot open')
+
+
+@pytest.mark.parametrize('spoil, code, words', [
+    (lambda patch: None, 2, 'nothing was selected'),
+    (lambda patch: patch.setattr(cv2, 'getBuildInformation', lambda: '  GUI:     NONE\n'), 1,
+     'pip install opencv-python; or give --init'),
+    (lambda patch: (patch.delenv('DISPLAY'), patch.delenv('WAYLAND_DISPLAY', raising=False)), 1,
+     'neither DISPLAY nor WAYLAND_DISPLAY'),
+    (lambda patch: patch.setattr(cv2, 'selectROIs', broken_window), 1,
+     'no window can be opened')],
+    ids=['nothing', 'headless', 'display', 'broken'])
+def test_why_nothing_can_be_selected_is_one_line(lmsco, tmp_path, scene_folder, window,
+                                                 monkeypatch, spoil, code, words):
+    spoil(monkeypatch)
+    outcome = lmsco('track', scene_folder, '--select', '--output', tmp_path / 'run')
+    assert outcome.exit_code == code and words in outcome.words
+    assert len(outcome.output.splitlines()) == 1 and not (tmp_path / 'run').exists()
+
+
 def test_default_output_is_named_after_the_source(lmsco, tmp_path, scene_folder, start,
                                                   monkeypatch):
     monkeypatch.chdir(tmp_path)
@@ -117,6 +202,11 @@ def test_configuration_that_is_none_is_named(lmsco, tmp_path, scene_folder, star
     (('--init', '10,10,20,20', '--config', 'missing.yaml'), 2, 'does not exist'),
     (('--init', '10,10,20,20', '--topic', 'image'), 1, 'is not a bag'),
     (('--init', '900,10,20,20'), 1, '900'),
+    (('--init', '10,10,20,20', '--init', '900,10,20,20'), 1, '900'),
+    (('--init', '10,10,20,20', '--init', '1,2,3'), 2, 'four numbers'),
+    (('--init', '10,10,20,20', '--start', '15'), 2, 'no frame 15; the source has 15'),
+    (('--init', '10,10,20,20', '--start', '-1'), 2, 'equal to 0'),
+    (('--init', '10,10,20,20', '--select'), 2, 'both name the targets'),
     (('--init', '10,10,20,20', '--frames', '0'), 2, 'equal to 1'),
     (('--init', '10,10,20,20', '--frames', '9' * 20), 2, 'equal to 1000000000'),
 ])

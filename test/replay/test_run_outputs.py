@@ -15,6 +15,7 @@
 """The folder of a run holds table, film and summary."""
 
 import csv
+from dataclasses import replace
 import errno
 from unittest.mock import Mock
 
@@ -43,14 +44,15 @@ def test_rows_are_exact_and_lost_ones_have_no_box(tmp_path):
         first, second = csv.DictReader(stream)
     assert first == {
         'frame': '0', 'stamp': '1700000000.000000007', 'x': '20.250', 'y': '10.000',
-        'width': '12.000', 'height': '16.000', 'score': '0.8125', 'state': 'tracking'}
+        'width': '12.000', 'height': '16.000', 'score': '0.8125', 'state': 'tracking',
+        'id': '1'}
     assert second['x'] == second['height'] == '' and second['state'] == 'lost'
 
 
 def test_all_outputs_are_written(tmp_path, frames):
     with RunOutputs(tmp_path / 'a' / 'run', 25, 'a run') as outputs:
         for frame in frames:
-            outputs.add(frame, result(), BoundingBox(20, 10, 12, 16))
+            outputs.add(frame, {1: result()}, BoundingBox(20, 10, 12, 16))
     files = {path.name for path in (tmp_path / 'a' / 'run').iterdir()}
     assert files == {'boxes.csv', 'overlay.mp4', 'summary.png'}
     assert len((tmp_path / 'a' / 'run' / 'boxes.csv').read_text().splitlines()) == 11
@@ -58,10 +60,28 @@ def test_all_outputs_are_written(tmp_path, frames):
     assert film.get(cv2.CAP_PROP_FRAME_COUNT) == 10
 
 
+def test_every_target_has_a_row_with_its_id_and_its_box_in_the_film(tmp_path, frames):
+    second = BoundingBox(2, 3, 8, 6)
+    results = {3: result(), 7: replace(result(TrackState.UNCERTAIN), box=second)}
+    for name, told in (('one', {3: result()}), ('two', results)):
+        with RunOutputs(tmp_path / name, 25, 'a run') as outputs:
+            outputs.add(frames[0], told)
+            assert f'boxes.csv with {len(told)} rows' in outputs.kept
+    with (tmp_path / 'two' / 'boxes.csv').open() as stream:
+        rows = list(csv.DictReader(stream))
+    assert [(row['frame'], row['id'], row['x'], row['state']) for row in rows] == [
+        ('0', '3', '20.250', 'tracking'), ('0', '7', '2.000', 'uncertain')]
+    one, two = (cv2.VideoCapture(str(tmp_path / name / 'overlay.mp4')).read()[1].astype(int)
+                for name in ('one', 'two'))
+    factor = one.shape[0] / frames[0].image.shape[0]
+    left = round(second.x * factor)
+    assert np.abs(one - two)[round(5 * factor), left - 2:left + 3].max() > 40
+
+
 def test_what_was_tracked_before_an_error_is_kept(tmp_path, frames):
     with pytest.raises(RuntimeError):
         with RunOutputs(tmp_path / 'run', 25, 'a run') as outputs:
-            outputs.add(frames[0], result())
+            outputs.add(frames[0], {1: result()})
             raise RuntimeError
     assert (tmp_path / 'run' / 'summary.png').stat().st_size > 1000
 
@@ -70,7 +90,7 @@ def test_place_that_cannot_be_written_to(tmp_path, frames):
     (tmp_path / 'file').write_text('')
     with pytest.raises(OutputError, match='run: Not a directory; check the place'):
         with RunOutputs(tmp_path / 'file' / 'run', 25, 'a run') as outputs:
-            outputs.add(frames[0], result())
+            outputs.add(frames[0], {1: result()})
 
 
 def test_every_row_is_whole_in_the_file_at_once(tmp_path):
@@ -108,7 +128,7 @@ def test_full_disk_leaves_no_half_of_a_row(tmp_path_factory, room):
                 file.add(index, 0, result())
     assert full.value.filename == str(path)
     heading, *rows = path.read_text().splitlines(keepends=True)
-    assert len(rows) == file.rows and all(row.endswith(',tracking\n') for row in rows)
+    assert len(rows) == file.rows and all(row.endswith(',tracking,1\n') for row in rows)
     assert sum(map(len, rows)) <= room
 
 
@@ -118,10 +138,10 @@ def test_full_disk_names_the_file_that_suffered_first(tmp_path, frames, monkeypa
     full = OSError(errno.ENOSPC, 'No space left on device', str(tmp_path / 'boxes.csv'))
     with pytest.raises(OutputError, match='boxes.csv: No space left on device'):
         with outputs:
-            outputs.add(frames[0], result())
+            outputs.add(frames[0], {1: result()})
             monkeypatch.setattr(BoxesFile, '_append', Mock(side_effect=full))
             monkeypatch.setattr(ContactSheet, 'save', Mock(side_effect=full))
-            outputs.add(frames[1], result())
+            outputs.add(frames[1], {1: result()})
     assert outputs.kept == f'kept in {tmp_path}: boxes.csv with 1 rows, overlay.mp4'
 
 
@@ -132,7 +152,7 @@ def test_summary_that_finds_no_room_is_told_and_leaves_nothing(tmp_path, frames,
     monkeypatch.setattr(ContactSheet, 'save', save)
     with pytest.raises(OutputError, match='summary.png: No space left on device'):
         with RunOutputs(tmp_path, 25, 'a run') as outputs:
-            outputs.add(frames[0], result())
+            outputs.add(frames[0], {1: result()})
     assert {path.name for path in tmp_path.iterdir()} == {'boxes.csv', 'overlay.mp4'}
 
 
@@ -159,10 +179,10 @@ def test_run_without_a_frame_leaves_earlier_results_untouched(tmp_path):
 def test_earlier_results_are_replaced_and_nothing_else(tmp_path, frames):
     earlier_results(tmp_path)
     with RunOutputs(tmp_path, 25, 'a run') as outputs:
-        outputs.add_row(0, 0, result())
+        outputs.add_rows(0, 0, {1: result()})
         assert outputs.replaced == ('boxes.csv', 'overlay.mp4', 'summary.png')
         assert set(contents(tmp_path)) == {'boxes.csv', 'notes.txt'}
-        outputs.add_picture(frames[0], result())
+        outputs.add_picture(frames[0], {1: result()})
     after = contents(tmp_path)
     assert after.pop('notes.txt') == b'mine' and len(after) == 3
     assert b'earlier' not in after.values()

@@ -41,7 +41,7 @@ def played(path):
 def test_film_plays_with_all_frames(tmp_path, image):
     with OverlayVideo(tmp_path / 'overlay.mp4', 25) as film:
         for index in range(12):
-            film.add(image, result(20 + index), label=str(index))
+            film.add(image, {1: result(20 + index)}, label=str(index))
     frames, fps = played(tmp_path / 'overlay.mp4')
     assert len(frames) == 12 and fps == pytest.approx(25)
     height = image.shape[0] * enlargement(image.shape[0])
@@ -52,7 +52,7 @@ def test_box_moves_in_the_film(tmp_path):
     image = np.full((400, 400), 30, np.uint8)
     with OverlayVideo(tmp_path / 'overlay.mp4', 25) as film:
         for x in (100.0, 300.0):
-            film.add(image, result(x))
+            film.add(image, {1: result(x)})
     frames, _ = played(tmp_path / 'overlay.mp4')
     green = [f[5:35, 90:].astype(int) for f in frames]
     centers = [np.argwhere(g[..., 1] - g[..., 2] > 60)[:, 1].mean() + 90 for g in green]
@@ -67,19 +67,19 @@ def test_small_images_are_enlarged_and_large_ones_are_not():
 
 def test_a_size_that_changes_does_not_end_the_film(tmp_path):
     with OverlayVideo(tmp_path / 'overlay.mp4', 25) as film:
-        film.add(np.full((400, 500), 90, np.uint8), result())
-        film.add(np.full((480, 640), 90, np.uint8), result())
+        film.add(np.full((400, 500), 90, np.uint8), {1: result()})
+        film.add(np.full((480, 640), 90, np.uint8), {1: result()})
     assert len(played(tmp_path / 'overlay.mp4')[0]) == 2
 
 
 def test_view_without_drawings_is_returned(tmp_path):
     image = np.full((400, 400), 30, np.uint8)
     with OverlayVideo(tmp_path / 'overlay.mp4', 25) as film:
-        view = film.add(image, result(), truth=BoundingBox(50, 50, 20, 20))
+        view = film.add(image, {1: result()}, truth=BoundingBox(50, 50, 20, 20))
     assert (view == 30).all()
 
 
 def test_a_place_that_cannot_be_written_is_told(tmp_path):
     with pytest.raises(OSError, match=r'No such file.*overlay\.mp4'):
         with OverlayVideo(tmp_path / 'missing' / 'overlay.mp4', 25) as film:
-            film.add(np.full((400, 400), 30, np.uint8), result())
+            film.add(np.full((400, 400), 30, np.uint8), {1: result()})
