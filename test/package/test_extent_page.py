@@ -23,6 +23,7 @@ import sys
 import pytest
 
 from lmsco_ros.core.extent import fusion
+from lmsco_ros.core.presence.trust import MEASURED, UNMEASURED
 from lmsco_ros.core.weights.registry import find_source
 from training.extent.bodies import PLANS
 
@@ -109,6 +110,13 @@ def test_constants_of_the_fusion_are_those_of_the_code():
         'border': fusion._CHANGE_AT_BORDER, 'convention': fusion._CONVENTION}
     assert f'{fusion._BORDER_PIXELS} pixels away' in PAGE
     assert f'at least {fusion._SMALLEST_SIDE:g} pixels' in PAGE
+
+
+def test_coefficients_on_the_card_are_those_of_the_code():
+    told = [[number(figure) for figure in figures]
+            for _, *figures in rows(CARD, 'coefficients in use')]
+    assert told == [[model.quality, model.likeness, model.presence, model.constant]
+                    for model in (MEASURED, UNMEASURED)]
 
 
 def test_all_plans_of_bodies_are_named():
