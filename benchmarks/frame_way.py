@@ -51,7 +51,7 @@ STEPS = (
     ('5  score', 'channels times filter, summed; its peak is the place',
      'learning/memory.py, fourier/localization.py'),
     ('6  box', 'judged, measured, fused, told',
-     'presence/monitor.py, extent/measurement.py, extent/fusion.py'),
+     'presence/monitor.py, extent/fusion.py'),
 )
 TARGET, REGION = '#00c060', '#ffb000'
 

@@ -46,7 +46,7 @@ A configuration is a preset and what differs from it, in a YAML file:
 
 ```yaml
 preset: default
-scale: {estimator: none}
+extent: {network: ''}
 ```
 
 The command line takes the file as `--config`, the node as `tracker_config`, Python as

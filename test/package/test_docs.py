@@ -128,7 +128,7 @@ def test_configurations_on_the_pages_are_accepted_and_change_something(page):
         assert TrackerConfig.from_dict(block) != default or same
 
 
-@pytest.mark.parametrize('page', ['tuning', 'paper', 'architecture'])
+@pytest.mark.parametrize('page', ['tuning', 'paper', 'architecture', 'extent'])
 def test_keys_that_the_pages_name_exist(page):
     known = keys(TrackerConfig.preset('default'))
     sections = '|'.join(field.name for field in fields(TrackerConfig))

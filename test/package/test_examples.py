@@ -126,7 +126,7 @@ def test_own_sequences_are_evaluated_with_both_configurations(scene, tmp_path, c
     write_images(scene, tmp_path / 'sequences' / 'walk' / 'ir')
     (tmp_path / 'sequences' / 'walk' / 'groundtruth.txt').write_text(
         '\n'.join(text_of(frame.box) for frame in scene))
-    (tmp_path / 'fixed.yaml').write_text('scale: {estimator: none}')
+    (tmp_path / 'fixed.yaml').write_text("extent: {network: ''}")
     load('own_sequences').main([str(tmp_path / 'sequences'),
                                 '--config', str(tmp_path / 'fixed.yaml')])
     lines = [line.split() for line in capsys.readouterr().out.splitlines()]

@@ -34,7 +34,7 @@ class ExtentConfig:
     Attributes
     ----------
     network : str
-        Name of its weights; empty for none, and a size that follows the scale estimator alone.
+        Name of its weights; empty for none, and a size that only a search over scales changes.
 
     """
 

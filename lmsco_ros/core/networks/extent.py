@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The bundled network that measures the extent of a target (training/extent/README.md)."""
+"""The bundled network that measures the extent of a target (training/README.md)."""
 
 from __future__ import annotations
 

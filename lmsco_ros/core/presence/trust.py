@@ -57,8 +57,8 @@ class TrustModel:
     constant: float
 
 
-MEASURED = TrustModel(quality=0.34, likeness=0.59, presence=1.38, constant=-1.12)
-UNMEASURED = TrustModel(quality=2.09, likeness=2.23, presence=0.0, constant=2.47)
+MEASURED = TrustModel(quality=1.01, likeness=0.60, presence=1.01, constant=0.08)
+UNMEASURED = TrustModel(quality=2.45, likeness=1.81, presence=0.0, constant=3.74)
 
 
 def regressors(quality: float, likeness: float, presence: float) -> tuple[float, float, float]:
