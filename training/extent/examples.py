@@ -153,8 +153,8 @@ def patches(images: torch.Tensor, boxes: torch.Tensor, bounds: torch.Tensor, siz
     fine = _OVERSAMPLING * size
     axis = (2 * torch.arange(fine, device=boxes.device) + 1) / fine - 1
     lines = [middle[:, i, None] + reach * axis for i in range(2)]
-    held = [torch.minimum(torch.maximum(line, bounds[:, i, None] + 0.5), bounds[:, i + 2, None] - 0.5)
-            for i, line in enumerate(lines)]
+    held = [torch.minimum(torch.maximum(line, bounds[:, i, None] + 0.5),
+                          bounds[:, i + 2, None] - 0.5) for i, line in enumerate(lines)]
     grid = torch.stack([held[0][:, None].expand(-1, fine, -1), held[1][:, :, None].expand(
         -1, -1, fine)], dim=-1) * (2 / SIDE) - 1
     flat = images.reshape(-1, 1, SIDE, SIDE)
@@ -168,7 +168,7 @@ def patches(images: torch.Tensor, boxes: torch.Tensor, bounds: torch.Tensor, siz
 
 
 def _inside(line: torch.Tensor, low: torch.Tensor, high: torch.Tensor, size: int) -> torch.Tensor:
-    """Return which part of each of `size` pixels of a line lies between limits, shape (n, size)."""
+    """Return how much of each of `size` pixels lies between limits, shape (n, size)."""
     inside = (line >= low[:, None]) & (line <= high[:, None])
     return inside.float().reshape(len(line), size, -1).mean(dim=2)
 

@@ -127,7 +127,8 @@ class RenderedPairs:
             torch.rand(count, device=device) < 0.85)
         slope = torch.randn(count, 2, device=device) / SIDE
         axis = torch.arange(SIDE, device=device) - SIDE / 2
-        ramp = slope[:, 0, None, None] * axis[None, None] + slope[:, 1, None, None] * axis[None, :, None]
+        ramp = (slope[:, 0, None, None] * axis[None, None]
+                + slope[:, 1, None, None] * axis[None, :, None])
         smooth = blurred(seen, 3.0 * torch.rand(count, device=device))
         return smooth * strength[:, None, None, None] + ramp[:, None]
 
@@ -249,7 +250,8 @@ class ClipPairs:
         first, later = self._clips[one], self._clips[two]
         there = later.boxes.isfinite().all(dim=1)
         half = (first.boxes[:, 2:] - first.boxes[:, :2]) / 2
-        absent = SIDE / 2 + torch.cat([-half, half], 1) * first.scales[:, None] / later.scales[:, None]
+        zoom = (first.scales / later.scales)[:, None]
+        absent = SIDE / 2 + zoom * torch.cat([-half, half], 1)
         boxes = torch.stack([first.boxes, torch.where(there[:, None], later.boxes, absent)], 1)
         images = torch.stack([first.images, later.images], 1).float() / 255
         gone = torch.rand(count, device=device) < 1 / 8

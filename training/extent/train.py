@@ -81,8 +81,8 @@ class ExtentObjective:
         return float(overlaps(batch.boxed(edges), batch.truth)[batch.measurable].mean())
 
 
-def answers(network: ExtentNet, batch: Examples) -> tuple[torch.Tensor, torch.Tensor,
-                                                           torch.Tensor]:
+def answers(network: ExtentNet,
+            batch: Examples) -> tuple[torch.Tensor, torch.Tensor, torch.Tensor]:
     """Return edges (n, 4), logarithms of their scales (n, 4), log-odds of presence (n,)."""
     first, now = network(torch.cat([batch.first, batch.now]))[0].chunk(2)
     first = first * batch.known[:, None, None, None]
@@ -177,7 +177,8 @@ def main() -> None:
     held_out = {name: take(batches({name: source}, {name: 1.0}, held['size']), held['batches'])
                 for name, source in {**sources, 'clips': ClipPairs(windows['held_out'])}.items()}
     trained = {name: source for name, source in sources.items() if name != options.without}
-    network, name = ExtentNet(), f'extent_without_{options.without}' if options.without else 'extent'
+    network = ExtentNet()
+    name = f'extent_without_{options.without}' if options.without else 'extent'
     train(network, ExtentObjective(options.without != _VARIANCE),
           batches(trained, settings['shares'], options.batch or settings['batch_size']),
           [batch for parts in held_out.values() for batch in parts], schedule,

@@ -115,7 +115,6 @@ class ExtentMeter:
         return Measurement(edges, deviations, float(answer[8]))
 
 
-
 def _patch(network: ExtentNet, view: FrameView, box: BoundingBox) -> np.ndarray:
     """Return what a network sees of a box, shape (3, size, size)."""
     size, side = network.size, network.context * _side(box)

@@ -21,8 +21,8 @@ from dataclasses import dataclass
 import math
 
 from lmsco_ros.core.detection.detector import Detection, Detector
-from lmsco_ros.core.imaging.view import FrameView
 from lmsco_ros.core.extent.measurement import ExtentMeter, Measurement
+from lmsco_ros.core.imaging.view import FrameView
 from lmsco_ros.core.networks.together import Asking
 from lmsco_ros.core.presence.distractors import Distractors
 from lmsco_ros.core.presence.evidence import Assessment, Evidence

@@ -22,8 +22,8 @@ import pytest
 
 from lmsco_ros.core import BoundingBox, LMSCOTracker, TrackerConfig, TrackState
 from lmsco_ros.core.config import (
-    ChannelConfig, ExtentConfig, FeatureConfig, IntensityConfig, LearningConfig, PresenceConfig, SamplingConfig,
-    ScaleConfig, SearchConfig)
+    ChannelConfig, ExtentConfig, FeatureConfig, IntensityConfig, LearningConfig, PresenceConfig,
+    SamplingConfig, ScaleConfig, SearchConfig)
 
 CONFIG = TrackerConfig(
     features=(FeatureConfig((ChannelConfig('hog'), ChannelConfig('intensity')), 4),),
