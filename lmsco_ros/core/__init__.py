@@ -16,13 +16,13 @@
 
 from lmsco_ros.core.config import TrackerConfig
 from lmsco_ros.core.errors import (
-    BoxError, BusyError, ConfigError, ImageError, LMSCOError, NotInitializedError, TimeError,
-    UnknownTargetError, WeightsError)
+    BoxError, BusyError, ConfigError, ImageError, LMSCOError, NotInitializedError, PointError,
+    TimeError, UnknownTargetError, WeightsError)
 from lmsco_ros.core.tracker import LMSCOTracker, MultiTracker
 from lmsco_ros.core.types import BoundingBox, TrackResult, TrackState
 
 __all__ = [
     'BoundingBox', 'BoxError', 'BusyError', 'ConfigError', 'ImageError', 'LMSCOError',
-    'LMSCOTracker', 'MultiTracker', 'NotInitializedError', 'TimeError', 'TrackerConfig',
-    'TrackResult', 'TrackState', 'UnknownTargetError', 'WeightsError',
+    'LMSCOTracker', 'MultiTracker', 'NotInitializedError', 'PointError', 'TimeError',
+    'TrackerConfig', 'TrackResult', 'TrackState', 'UnknownTargetError', 'WeightsError',
 ]

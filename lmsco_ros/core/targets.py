@@ -27,8 +27,10 @@ import numpy as np
 from lmsco_ros.core.backend import Backend, limit_threads, select_backend
 from lmsco_ros.core.config import TrackerConfig
 from lmsco_ros.core.errors import BusyError, ConfigError, ImageError
+from lmsco_ros.core.extent.pointing import extent_at
 from lmsco_ros.core.imaging.frame import Frame, read_frame
-from lmsco_ros.core.imaging.gain import survey
+from lmsco_ros.core.imaging.gain import AutomaticGain, survey
+from lmsco_ros.core.imaging.view import FrameView
 from lmsco_ros.core.networks.together import side_by_side
 from lmsco_ros.core.track import Track
 from lmsco_ros.core.types import BoundingBox, TrackResult, TrackState
@@ -106,6 +108,32 @@ class Targets:
         self._started += 1
         self._tracks, self._kind = {**staying, self._started: track}, frame.kind
         return self._started
+
+    def box_at(self, image: np.ndarray, point: Sequence[float]) -> BoundingBox:
+        """
+        Return the box of what stands out at a point of a frame.
+
+        Parameters
+        ----------
+        image : ndarray
+            The frame.
+        point : sequence of float
+            Image position (x, y) in pixels.
+
+        Raises
+        ------
+        ImageError, PointError
+            When the frame cannot be read, or nothing stands out at the point.
+        ConfigError
+            When the configuration names no network that measures extents.
+
+        """
+        if self._networks.extent is None:
+            raise ConfigError('the configuration names no network that measures the extent of what '
+                              "is at a point; set extent.network to 'extent', or give a box")
+        frame = survey(read_frame(image).pixels, self._config.intensity)
+        condition = AutomaticGain(self._config.intensity).examine(frame)
+        return extent_at(self._networks.extent, FrameView(frame.image, condition.intensity), point)
 
     def advance(self, image: np.ndarray, time: float | None = None,
                 only: Collection[int] | None = None) -> dict[int, TrackResult]:

@@ -99,6 +99,34 @@ class LMSCOTracker(ConfiguredTargets):
             number = self._targets.start(image, box, time, self._targets.ids)
             return self._targets.results[number]
 
+    def initialize_at(self, image: np.ndarray, point: Sequence[float],
+                      time: float | None = None) -> TrackResult:
+        """
+        Start to follow what stands out from its surroundings at a point, whatever its extent.
+
+        Parameters
+        ----------
+        image : ndarray
+            Frame that shows the target.
+        point : sequence of float
+            Image position (x, y) on the target, in pixels.
+        time : float, optional
+            As for `initialize`.
+
+        Raises
+        ------
+        PointError
+            When the point is not in the image, or nothing stands out there; a former target is
+            kept, as with the errors of `initialize`.
+        ConfigError
+            When the configuration names no network that measures extents.
+
+        """
+        with self._alone():
+            box = self._targets.box_at(image, point)
+            number = self._targets.start(image, box, time, self._targets.ids)
+            return self._targets.results[number]
+
     def update(self, image: np.ndarray, time: float | None = None) -> TrackResult:
         """
         Find the target in the next frame.
@@ -200,6 +228,38 @@ class MultiTracker(ConfiguredTargets):
 
         """
         with self._alone():
+            return self._targets.start(image, box, time, in_place_of)
+
+    def initialize_at(self, image: np.ndarray, point: Sequence[float],
+                      time: float | None = None, in_place_of: Collection[int] = ()) -> int:
+        """
+        Start to follow what stands out from its surroundings at a point, whatever its extent.
+
+        Parameters
+        ----------
+        image : ndarray
+            Frame that shows the target.
+        point : sequence of float
+            Image position (x, y) on the target, in pixels.
+        time, in_place_of
+            As for `initialize`.
+
+        Returns
+        -------
+        int
+            Number of the target; `results` has its first result, with the box that was found.
+
+        Raises
+        ------
+        PointError
+            When the point is not in the image, or nothing stands out there; nothing changes, as
+            with the errors of `initialize`.
+        ConfigError
+            When the configuration names no network that measures extents.
+
+        """
+        with self._alone():
+            box = self._targets.box_at(image, point)
             return self._targets.start(image, box, time, in_place_of)
 
     def update(self, image: np.ndarray, time: float | None = None,

@@ -16,6 +16,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+import reprlib
 from typing import TYPE_CHECKING
 
 from lmsco_ros.core.errors import PointError
@@ -35,7 +37,7 @@ _ROUNDS = 3
 _DOUBT = 6.0
 
 
-def extent_at(network: ExtentNet, view: FrameView, point: tuple[float, float]) -> BoundingBox:
+def extent_at(network: ExtentNet, view: FrameView, point: Sequence[float]) -> BoundingBox:
     """
     Return the box of what stands out from its surroundings at a point.
 
@@ -48,7 +50,7 @@ def extent_at(network: ExtentNet, view: FrameView, point: tuple[float, float]) -
         Measures.
     view : FrameView
         The frame.
-    point : tuple of float
+    point : sequence of float
         Image position (x, y) in pixels.
 
     Raises
@@ -57,19 +59,30 @@ def extent_at(network: ExtentNet, view: FrameView, point: tuple[float, float]) -
         When the point is not in the image, or nothing stands out there.
 
     """
-    width, height = view.size
-    if not (0 <= point[0] <= width and 0 <= point[1] <= height):
-        raise PointError(f'the point {point} is not in the image of {width} x {height} pixels; '
-                         'give (x, y) in pixels of this image')
+    place = _checked(point, view.size)
     meter = ExtentMeter.unmarked(network)
     found = [measured for side in _sides(view) if (
-        measured := _settled(meter, view, BoundingBox.from_center(point, (side, side)))
-    ).box.contains(point)]
+        measured := _settled(meter, view, BoundingBox.from_center(place, (side, side)))
+    ).box.contains(place)]
     best = max(found, key=_worth, default=None)
     if best is None or _worth(best) < 0:
-        raise PointError(f'nothing stands out from its surroundings at {point}; expected a '
+        raise PointError(f'nothing stands out from its surroundings at {place}; expected a '
                          'target that is warmer or colder: point at its middle, or give its box')
     return visible_part(best.box, view.size)
+
+
+def _checked(point: object, image_size: tuple[int, int]) -> tuple[float, float]:
+    """Return a point (x, y) in the image."""
+    try:
+        x, y = (float(value) for value in point)  # type: ignore[attr-defined]
+    except (TypeError, ValueError, OverflowError):
+        raise PointError(f'the point {reprlib.repr(point)} is a {type(point).__name__}; expected '
+                         '(x, y): two numbers in pixels') from None
+    width, height = image_size
+    if not (0 <= x <= width and 0 <= y <= height):
+        raise PointError(f'the point ({x:g}, {y:g}) is not in the image of {width} x {height} '
+                         'pixels; give (x, y) in pixels of this image')
+    return x, y
 
 
 def _sides(view: FrameView) -> list[float]:

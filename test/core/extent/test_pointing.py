@@ -68,7 +68,13 @@ def test_noise_is_nothing(network, point):
         extent_at(network, view([], noise=8.0), point)
 
 
-@pytest.mark.parametrize('point', [(-1, 5), (201, 5), (5, 161)])
+@pytest.mark.parametrize('point', [(1, 2, 3), 'ab', None, 7, ('a', 'b'), (10**400, 1)])
+def test_what_is_no_point_is_refused(network, point):
+    with pytest.raises(PointError, match=r'expected \(x, y\): two numbers'):
+        extent_at(network, view([]), point)
+
+
+@pytest.mark.parametrize('point', [(np.nan, 5), (-1, 5), (201, 5), (5, 161)])
 def test_point_outside_is_refused(network, point):
     with pytest.raises(PointError, match='not in the image of 200 x 160 pixels'):
         extent_at(network, view([]), point)
