@@ -127,7 +127,8 @@ class Track:
         outlook = Outlook(view, self._box, self._expected(view), neighbors)
         sighting = yield from self._look(outlook)
         if self._after_shutter or not self._monitor.believable(sighting.assessment):
-            sighting = self._search_elsewhere(outlook, sighting)
+            sighting = self._redetection(outlook, sighting, self._prediction.misses,
+                                         after_shutter=self._after_shutter)
         self._after_shutter = False
         verdict = self._monitor.judge(sighting.assessment)
         if verdict.believed:
@@ -165,11 +166,6 @@ class Track:
     def _look(self, outlook: Outlook) -> Asking[Sighting]:
         """Return what is where the target is expected."""
         return (yield from self._observer.look(outlook, scale_factors(self._config.scale)))
-
-    def _search_elsewhere(self, outlook: Outlook, here: Sighting) -> Sighting:
-        """Return what convinces most in other places of the image, or what is here."""
-        return self._redetection(outlook, here, self._prediction.misses,
-                                 after_shutter=self._after_shutter)
 
     def _fused(self, view: FrameView, sighting: Sighting) -> BoundingBox:
         """Return the box at a sighting, in the size that was searched and measured there."""

@@ -14,6 +14,7 @@
 
 """The tracker as its users see it: what it takes, what it gives, what it refuses."""
 
+from dataclasses import replace
 import gc
 import weakref
 
@@ -22,10 +23,11 @@ import numpy as np
 import pytest
 
 from lmsco_ros.core import (
-    BoundingBox, BoxError, ImageError, LMSCOError, LMSCOTracker, NotInitializedError, TimeError,
-    TrackerConfig, TrackResult, TrackState)
+    BoundingBox, BoxError, ConfigError, ImageError, LMSCOError, LMSCOTracker, MultiTracker,
+    NotInitializedError, PointError, TimeError, TrackerConfig, TrackResult, TrackState)
 from lmsco_ros.core.config import (
-    ChannelConfig, FeatureConfig, LearningConfig, SamplingConfig, ScaleConfig, SearchConfig)
+    ChannelConfig, ExtentConfig, FeatureConfig, LearningConfig, SamplingConfig, ScaleConfig,
+    SearchConfig)
 from lmsco_ros.core.imaging.regions import visible_part
 
 # Small, since most of what is asked here does not depend on accuracy.
@@ -33,8 +35,7 @@ FAST = TrackerConfig(
     features=(FeatureConfig((ChannelConfig('hog'), ChannelConfig('intensity')), 4),),
     sampling=SamplingConfig(search_factor=4.0, patch_size_min=84, patch_size_max=84),
     learning=LearningConfig(initial_iterations=10, iterations=2, gradient_steps=2,
-                            memory_size=5, update_interval=2),
-    scale=ScaleConfig(estimator='filter', exponent_min=-3, exponent_max=3))
+                            memory_size=5, update_interval=2))
 CENTER, SIZE = (80.3, 60.4), (24.0, 18.0)
 
 
@@ -122,11 +123,11 @@ def test_results_have_the_promised_types(scene):
         assert result.search_region.width == pytest.approx(result.search_region.height)
 
 
-@pytest.mark.parametrize('estimator', ['none', 'search'])
-def test_map_lies_over_the_search_region(scene, estimator):
+@pytest.mark.parametrize('reach', [0, 1])
+def test_map_lies_over_the_search_region(scene, reach):
     config = TrackerConfig(
         features=FAST.features, sampling=FAST.sampling, learning=FAST.learning,
-        scale=ScaleConfig(estimator=estimator, exponent_min=-1, exponent_max=1))
+        scale=ScaleConfig(exponent_min=-reach, exponent_max=reach))
     previous = box_of()
     for n, result in enumerate(walk(scene, 6, config)):
         region, scores = result.search_region, result.confidence_map
@@ -380,10 +381,34 @@ def test_every_way_of_learning_tracks(scene, learning):
     config = TrackerConfig(
         features=(FeatureConfig((ChannelConfig('hog'),), 4),
                   FeatureConfig((ChannelConfig('intensity'),), 4)),
-        sampling=FAST.sampling, learning=learning, scale=ScaleConfig(estimator='none'),
-        search=SearchConfig(tiles=0))
+        sampling=FAST.sampling, learning=learning, search=SearchConfig(tiles=0))
     last = walk(scene, 9, config)[-1]
     assert last.box.overlap(box_of((CENTER[0] + 8, CENTER[1]))) > 0.75
+
+
+@pytest.mark.parametrize('make', [LMSCOTracker, MultiTracker])
+def test_target_at_a_point_is_followed(scene, make):
+    tracker = make(replace(FAST, extent=ExtentConfig('extent')))
+    started = tracker.initialize_at(later(scene, 0), (CENTER[0] + 3, CENTER[1] - 2))
+    result = started if make is LMSCOTracker else tracker.results[started]
+    assert result.box.overlap(box_of()) > 0.6
+    told = tracker.update(later(scene, 1))
+    result = told if make is LMSCOTracker else told[started]
+    assert result.box.overlap(box_of()) > 0.6 and result.state is TrackState.TRACKING
+
+
+def test_former_target_is_kept_where_nothing_is_at_a_point(scene):
+    tracker = LMSCOTracker(replace(FAST, extent=ExtentConfig('extent')))
+    tracker.initialize(later(scene, 0), box_of())
+    empty = np.random.default_rng(2).integers(7000, 7050, later(scene).shape).astype(np.uint16)
+    with pytest.raises(PointError, match='nothing stands out'):
+        tracker.initialize_at(empty, CENTER)
+    assert tracker.update(later(scene)).box.overlap(box_of()) > 0.6
+
+
+def test_point_needs_a_network_that_measures(scene, tracker):
+    with pytest.raises(ConfigError, match="set extent.network to 'extent', or give a box"):
+        tracker.initialize_at(later(scene, 0), CENTER)
 
 
 @pytest.mark.parametrize('preset', ['default', 'hcs'])

@@ -24,7 +24,8 @@ from lmsco_ros.core import BoundingBox, BoxError, TimeError, TrackerConfig, Trac
 from lmsco_ros.core import track as track_module
 from lmsco_ros.core.config import LearningConfig, PresenceConfig, ScaleConfig
 from lmsco_ros.core.detection.detector import Detection
-from lmsco_ros.core.detection.scale import ScaleEstimator
+from lmsco_ros.core.detection.scale import scale_factors
+from lmsco_ros.core.extent.measurement import Measurement
 from lmsco_ros.core.fourier.localization import Peak
 from lmsco_ros.core.imaging.gain import FrameCondition, FrameSurvey, IntensityRange
 from lmsco_ros.core.imaging.view import FrameView
@@ -40,24 +41,26 @@ START = BoundingBox(40, 30, 20, 10)
 AHEAD = START.moved_to((55, 36))
 MOVED = START.moved_to((53, 35))
 REGION = BoundingBox(0, 0, 80, 80)
+SEARCHED = ScaleConfig(step=1.25, exponent_min=-1, exponent_max=0)
 FIRST_RANGE, RANGE = IntensityRange(0, 1), IntensityRange(10, 20)
 PLAIN = FrameCondition(RANGE, shutter_closed=False, inverted=False, cut=False)
 SHUT, CUT = replace(PLAIN, shutter_closed=True), replace(PLAIN, cut=True)
 BELIEVED = Verdict(0.8, TrackState.TRACKING, believed=True, learns=True)
 DOUBTED = Verdict(0.4, TrackState.UNCERTAIN, believed=True, learns=False)
 MISSED = Verdict(0.1, TrackState.UNCERTAIN, believed=False, learns=False)
-CLASSES = {'gain': 'AutomaticGain', 'detector': 'Detector', 'comparison': 'Comparison',
+CLASSES = {'gain': 'AutomaticGain', 'detector': 'Detector', 'extent': 'EdgeFilter',
            'monitor': 'PresenceMonitor', 'observer': 'Observer', 'prediction': 'Prediction',
            'redetection': 'Redetection', 'motion': 'TargetState'}
 
 
 def sighting(center, presence, peak=3.0, box=START):
-    """Return something seen at a place, which the comparison gives log-odds."""
+    """Return something seen at a place, of which the network is so sure."""
     displacement = tuple((c - r) / 80 for c, r in zip(center, REGION.center, strict=True))
     grid = np.arange(25.0).reshape(5, 5) * peak
     found = Detection(REGION, Peak(displacement[::-1], 0, peak, grid, np.array([peak, 1.0])),
                       [], np.zeros((3, 2)), 10.0)
-    return Sighting(box, found, Assessment(Evidence(10.0, 1.0, presence), 1.0, presence, 0.8))
+    return Sighting(box, found, Assessment(Evidence(10.0, 1.0, presence), 1.0, presence, 0.8),
+                    Measurement(np.zeros((2, 2)), np.ones((2, 2)), presence))
 
 
 HERE, THERE = sighting((52, 36), 2.5), sighting((20, 60), -1.5)
@@ -87,16 +90,13 @@ def parts(monkeypatch):
         part = create_autospec(getattr(track_module, kind), instance=True)
         parts.attach_mock(part, name)
         monkeypatch.setattr(track_module, kind, Mock(return_value=part))
-    parts.attach_mock(create_autospec(ScaleEstimator, instance=True), 'scale')
-    monkeypatch.setattr(track_module, 'make_scale_estimator', Mock(return_value=parts.scale))
     parts.gain.examine.return_value = replace(PLAIN, intensity=FIRST_RANGE)
     parts.detector.return_value = sighting(START.center, 4.0, peak=2.0).detection
     parts.monitor.believable.return_value = True
     parts.monitor.judge.return_value = BELIEVED
     parts.observer.look.return_value, parts.redetection.return_value = Seen(HERE), THERE
     parts.prediction.expected.return_value, parts.prediction.misses = AHEAD, 0
-    parts.scale.search_factors = (0.9, 1.0)
-    parts.scale.found_factor.return_value = parts.scale.estimate.return_value = 1.0
+    parts.extent.side_effect = lambda box, measured: box
     parts.motion.box, parts.motion.velocity = MOVED, (2.0, -1.0)
     parts.motion.covariance = np.eye(4)
     monkeypatch.setattr(track_module, 'box_covariance', lambda *of: of)
@@ -133,10 +133,9 @@ def test_plain_frame_is_seen_judged_followed_and_learned_in_this_order(parts, tr
     advance(track, frame())
     assert names(parts) == [
         'motion.predict', 'gain.examine', 'prediction.expected', 'observer.look',
-        'monitor.believable', 'monitor.judge', 'scale.found_factor', 'scale.estimate',
-        'prediction.seen', 'redetection.restart', 'observer.keep', 'motion.measure',
-        'detector.remember', 'detector.train', 'scale.learn', 'prediction.expected',
-        'detector.watch']
+        'monitor.believable', 'monitor.judge', 'extent', 'prediction.seen',
+        'redetection.restart', 'observer.keep', 'motion.measure', 'detector.remember',
+        'detector.train', 'prediction.expected', 'detector.watch']
 
 
 def test_frame_is_examined_and_seen_in_its_range(parts, track):
@@ -147,12 +146,12 @@ def test_frame_is_examined_and_seen_in_its_range(parts, track):
     assert outlook.view.image is shown.image and outlook.view.intensity is RANGE
 
 
-def test_target_is_looked_for_where_it_is_expected_at_the_searched_scales(parts, track):
-    shown = frame()
+def test_target_is_looked_for_where_it_is_expected_at_the_searched_scales(parts):
+    track, shown = started(parts, replace(CONFIG, scale=SEARCHED)), frame()
     advance(track, shown)
     view = FrameView(shown.image, RANGE)
     parts.observer.look.assert_called_once_with(
-        Outlook(view, START, AHEAD), (0.9, 1.0), None)
+        Outlook(view, START, AHEAD), scale_factors(SEARCHED))
     assert parts.prediction.expected.call_args_list[0] == call(START, (120, 100))
 
 
@@ -191,7 +190,7 @@ def test_what_is_not_believable_is_searched_elsewhere_and_that_is_judged(parts, 
     assert parts.redetection.call_args_list == [call(
         Outlook(FrameView(shown.image, RANGE), START, AHEAD), HERE, 7, after_shutter=False)]
     parts.monitor.judge.assert_called_once_with(THERE.assessment)
-    parts.detector.remember.assert_called_once_with(THERE.detection)
+    parts.detector.remember.assert_called_once_with(THERE.detection, result.box.center)
     assert result.box.center == pytest.approx(THERE.detection.center)
 
 
@@ -237,26 +236,6 @@ def test_frame_without_a_cut_forgets_nothing(parts, track):
         assert unwanted not in names(parts)
 
 
-def test_comparison_of_the_frame_before_stands_in_frames_that_train(parts, track):
-    for _ in range(4):
-        advance(track, frame())
-    assert [made.args[2] for made in parts.observer.look.call_args_list] == [None, 2.5, None, 2.5]
-
-
-def test_carried_comparison_is_that_of_what_was_judged(parts, track):
-    parts.monitor.believable.return_value = False
-    advance(track, frame())
-    advance(track, frame())
-    assert [made.args[2] for made in parts.observer.look.call_args_list] == [None, -1.5]
-
-
-def test_comparison_is_made_in_every_frame_where_every_frame_trains(parts):
-    track = started(parts, replace(CONFIG, learning=LearningConfig(update_interval=1)))
-    for _ in range(3):
-        advance(track, frame())
-    assert [made.args[2] for made in parts.observer.look.call_args_list] == [None] * 3
-
-
 @pytest.mark.parametrize('verdict', [BELIEVED, DOUBTED], ids=['certain', 'doubted'])
 def test_believed_target_is_followed(parts, track, verdict):
     parts.monitor.judge.return_value = verdict
@@ -275,7 +254,7 @@ def test_target_that_is_not_believed_stays_where_it_was_and_counts_as_missed(par
     assert result.box == START and result.state is MISSED.state
     parts.prediction.missed.assert_called_once_with()
     for unwanted in ('prediction.seen', 'redetection.restart', 'observer.keep',
-                     'detector.remember', 'detector.train', 'scale.estimate',
+                     'detector.remember', 'detector.train', 'extent',
                      'motion.measure'):
         assert unwanted not in names(parts)
 
@@ -301,9 +280,7 @@ def test_wrong_time_changes_nothing(parts, track):
     advance(track, frame())
 
 
-def test_motion_takes_what_is_told_with_how_exactly_it_was_seen(parts):
-    track = started(parts, replace(CONFIG, scale=ScaleConfig(tolerance=1.0)))
-    parts.scale.estimate.return_value = 1.05
+def test_motion_takes_what_is_followed_with_how_exactly_it_was_seen(parts, track):
     advance(track, frame())
     (box, covariance), = (made.args for made in parts.motion.measure.call_args_list)
     assert box.size == pytest.approx(START.size) and box.center == pytest.approx((52, 36))
@@ -332,26 +309,38 @@ def test_frame_is_kept_where_the_target_is_certain_and_distractors_are_asked_for
     assert parts.observer.keep.call_args_list == expected
 
 
-def test_size_is_found_by_the_search_and_then_by_the_estimator(parts, track):
-    parts.scale.found_factor.return_value, parts.scale.estimate.return_value = 1.2, 1.5
-    shown = frame()
-    result = advance(track, shown)
-    assert parts.scale.found_factor.call_args.args[0].tolist() == [3.0, 1.0]
-    view, moved = parts.scale.estimate.call_args.args
-    assert view.image is shown.image
-    assert moved.center == pytest.approx((52, 36)) and moved.size == pytest.approx((24, 12))
-    assert result.box.center == pytest.approx((52, 36))
-    assert result.box.size == pytest.approx((36, 18))
+def test_size_is_searched_and_then_measured(parts):
+    track = started(parts, replace(CONFIG, scale=SEARCHED))
+    parts.extent.side_effect = lambda box, measured: box.scaled(1.5)
+    result = advance(track, frame())
+    (box, measured), = (made.args for made in parts.extent.call_args_list)
+    # The better of the two scores is that of the smaller scale.
+    assert box.center == pytest.approx((52, 36)) and box.size == pytest.approx((16, 8))
+    assert measured is HERE.measurement
+    assert result.box.center == pytest.approx((52, 36)) and result.box.size == (24, 12)
 
 
-@pytest.mark.parametrize('found, estimated', [(1e4, 1.0), (1.0, 1e4)])
-def test_size_remains_one_that_can_be_tracked(parts, track, found, estimated):
-    parts.scale.found_factor.return_value, parts.scale.estimate.return_value = found, estimated
+def test_box_follows_the_measurement_and_so_does_the_sample(parts, track):
+    parts.extent.side_effect = lambda box, measured: box.moved_to((57, 31))
+    result = advance(track, frame())
+    assert result.box.center == pytest.approx((57, 31))
+    parts.detector.remember.assert_called_once_with(HERE.detection, pytest.approx((57, 31)))
+    parts.prediction.seen.assert_called_once_with(pytest.approx((57, 31)))
+
+
+def test_size_is_kept_where_nothing_is_measured(parts, track):
+    parts.observer.look.return_value = Seen(replace(HERE, measurement=None))
+    assert advance(track, frame()).box.size == START.size
+    parts.extent.assert_not_called()
+
+
+@pytest.mark.parametrize('factor', [1e4, 1e-4])
+def test_size_remains_one_that_can_be_tracked(parts, track, factor):
+    parts.extent.side_effect = lambda box, measured: box.scaled(factor)
     advance(track, frame())
     advance(track, frame())
     last = parts.observer.look.call_args.args[0].last
-    assert max(last.size) == pytest.approx(2 * np.hypot(120, 100))
-    assert max(parts.scale.estimate.call_args.args[1].size) < 320 * found
+    assert max(last.size) <= 2.001 * np.hypot(120, 100) and min(last.size) >= 1.999
 
 
 def test_size_is_that_of_the_sighting(parts, track):
@@ -368,23 +357,16 @@ def test_target_beyond_the_border_is_followed_to_the_border(parts, track):
 def test_filter_learns_what_was_seen_and_trains_every_other_frame(parts, track):
     for _ in range(4):
         advance(track, frame())
-    assert parts.detector.remember.call_args_list == 4 * [call(HERE.detection)]
+    assert parts.detector.remember.call_args_list == 4 * [
+        call(HERE.detection, pytest.approx((52, 36)))]
     assert parts.detector.train.call_args_list == 2 * [call()]
-    assert parts.scale.learn.call_count == 2
-
-
-def test_size_is_learned_at_the_new_place(parts, track):
-    advance(track, frame())
-    shown = frame()
-    result = advance(track, shown)
-    parts.scale.learn.assert_called_once_with(FrameView(shown.image, RANGE), result.box)
 
 
 def test_doubted_target_is_not_learned(parts, track):
     parts.monitor.judge.return_value = DOUBTED
     advance(track, frame())
     advance(track, frame())
-    for unwanted in ('detector.remember', 'detector.train', 'scale.learn'):
+    for unwanted in ('detector.remember', 'detector.train'):
         assert unwanted not in names(parts)
 
 
@@ -405,15 +387,6 @@ def test_map_is_the_score_in_units_of_the_first_frame(parts, track):
     assert result.confidence_map[2, 2] == 0 and result.confidence_map.max() == 3.0 * 24 / 2.0
 
 
-def test_told_size_leaves_out_what_cannot_be_measured(parts):
-    track = started(parts, replace(CONFIG, scale=ScaleConfig(tolerance=1.0)))
-    parts.scale.estimate.return_value = 1.05
-    assert advance(track, frame()).box.size == pytest.approx(START.size)
-    # The tracker goes on with the size that was measured.
-    advance(track, frame())
-    assert parts.observer.look.call_args.args[0].last.size == pytest.approx((21, 10.5))
-
-
 def test_told_box_is_the_visible_part(parts, track):
     parts.observer.look.return_value = Seen(sighting((119, 36), 2.5))
     assert advance(track, frame()).box.as_tuple() == pytest.approx((109, 31, 11, 10))
@@ -421,22 +394,22 @@ def test_told_box_is_the_visible_part(parts, track):
 
 def test_parts_are_made_of_the_first_frame(parts, monkeypatch):
     made = {name: getattr(track_module, kind) for name, kind in CLASSES.items()}
-    make_scale, shown = track_module.make_scale_estimator, frame()
-    networks = Networks(comparison='network')
+    make_meter, shown = Mock(), frame()
+    monkeypatch.setattr(track_module.ExtentMeter, 'marked', make_meter)
+    networks = Networks(extent='network')
     track = Track(CONFIG, 'backend', networks, shown, START)
     view = FrameView(shown.image, FIRST_RANGE)
     made['gain'].assert_called_once_with(CONFIG.intensity)
     made['detector'].assert_called_once_with(CONFIG, 'backend', networks, view, START)
     assert parts.detector.call_args_list == [call(view, START)]
-    made['comparison'].assert_called_once_with('network', view, START)
+    make_meter.assert_called_once_with('network', view, START)
+    made['extent'].assert_called_once_with(START, (120, 100))
     made['monitor'].assert_called_once_with(CONFIG.presence)
     made['observer'].assert_called_once_with(
-        parts.detector, parts.comparison, parts.monitor, parts.detector.return_value)
+        parts.detector, make_meter.return_value, parts.monitor, parts.detector.return_value)
     made['redetection'].assert_called_once_with(
         CONFIG.search, parts.observer, parts.monitor, view, START)
     made['motion'].assert_called_once_with(START)
-    make_scale.assert_called_once_with(CONFIG.scale, START.size)
-    parts.scale.learn.assert_called_once_with(view, START)
     parts.prediction.seen.assert_called_once_with(START.center)
     parts.observer.keep.assert_called_once_with(view, START)
     parts.detector.watch.assert_called_once_with(view, START)
@@ -446,11 +419,10 @@ def test_parts_are_made_of_the_first_frame(parts, monkeypatch):
     assert track.result.confidence_map.max() == 24
 
 
-def test_nothing_is_compared_without_a_network(parts):
+def test_nothing_is_measured_without_a_network(parts):
     made = track_module.Observer
     started(parts)
     assert made.call_args.args[1] is None
-    track_module.Comparison.assert_not_called()
 
 
 def test_box_is_checked_against_the_image_first(parts):
