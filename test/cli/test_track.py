@@ -52,14 +52,14 @@ def test_follows_the_target_of_a_folder(lmsco, tmp_path, scene_folder, scene, st
 
 
 def test_tracker_knows_the_times_of_the_frames(lmsco, tmp_path, scene_folder, start, monkeypatch):
-    from lmsco_ros.core import LMSCOTracker
+    from lmsco_ros.core import MultiTracker
 
     times = []
     for name in ('initialize', 'update'):
-        def noted(tracker, *given, work=getattr(LMSCOTracker, name)):
+        def noted(tracker, *given, work=getattr(MultiTracker, name)):
             times.append(given[-1])
             return work(tracker, *given)
-        monkeypatch.setattr(LMSCOTracker, name, noted)
+        monkeypatch.setattr(MultiTracker, name, noted)
     lmsco('track', scene_folder, '--init', start, '--output', tmp_path / 'run', '--frames', 3)
     assert times == pytest.approx([0.0, 1 / 30, 2 / 30])
 

@@ -23,6 +23,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from lmsco_ros.core.imaging.view import FrameView
+from lmsco_ros.core.networks.together import Ask, Asking, at_once
 from lmsco_ros.core.types import BoundingBox
 
 if TYPE_CHECKING:
@@ -105,8 +106,15 @@ class ExtentMeter:
             Where the target is expected, and how large.
 
         """
-        answer = self._network.relate(self._reference, self._network.encode(
-            _patch(self._network, view, box)), (self._first_side, math.log2(_side(box))))
+        return at_once(self.ask(view, box))
+
+    def ask(self, view: FrameView, box: BoundingBox) -> Asking[Measurement]:
+        """Return the extent as `__call__` does, and ask the network for the encoding."""
+        network = self._network
+        encoding = yield Ask(id(network), network.encode_all, _patch(network, view, box))
+        # One by one: in a batch this part gives other bits, which what is measured feeds back.
+        answer = network.relate(
+            self._reference, encoding, (self._first_side, math.log2(_side(box))))
         unit = self._network.context * _side(box) / 2
         expected = np.array([[box.x, box.x + box.width], [box.y, box.y + box.height]])
         # The network speaks of left, top, right, bottom, and of Laplace distributions.

@@ -81,6 +81,12 @@ class ExtentNet(Backbone):
         return self.answer.weight.new_zeros(1, 64, 8, 8)
 
     @torch.inference_mode()
+    def encode_all(self, patches: Sequence[np.ndarray]) -> list[torch.Tensor]:
+        """Return what `encode` returns for each of several patches, in one pass."""
+        images = torch.from_numpy(np.stack(patches))
+        return list(self(images.to(self.answer.weight.device))[0].split(1))
+
+    @torch.inference_mode()
     def relate(self, reference: torch.Tensor, now: torch.Tensor,
                sides: tuple[float, float]) -> np.ndarray:
         """Return the answer of `measure` for one encoding, shape (9,), float64."""

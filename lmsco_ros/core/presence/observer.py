@@ -23,7 +23,7 @@ import math
 from lmsco_ros.core.detection.detector import Detection, Detector
 from lmsco_ros.core.extent.measurement import ExtentMeter, Measurement
 from lmsco_ros.core.imaging.view import FrameView
-from lmsco_ros.core.networks.together import Asking
+from lmsco_ros.core.networks.together import Asking, at_once
 from lmsco_ros.core.presence.distractors import Distractors
 from lmsco_ros.core.presence.evidence import Assessment, Evidence
 from lmsco_ros.core.presence.monitor import PresenceMonitor
@@ -132,7 +132,7 @@ class Observer:
                 detection, outlook.neighbors.own, outlook.neighbors.owned)
         if self.is_distractor(outlook, detection):
             detection = self._detector.near(detection, outlook.expected.center)
-        return self.weigh(outlook, detection, outlook.expected)
+        return (yield from self._ask(outlook, detection, outlook.expected))
 
     def detect(self, outlook: Outlook, box: BoundingBox) -> Detection:
         """Return what the filter sees around a box in its size."""
@@ -140,10 +140,13 @@ class Observer:
 
     def weigh(self, outlook: Outlook, detection: Detection, box: BoundingBox) -> Sighting:
         """Return a detection around a box, measured, with all that speaks for it."""
-        # One by one: what is measured decides where the next frame is looked at, and so has to be
-        # the same bits with one target and with several.
-        measured = None if self._meter is None else self._meter(
-            outlook.view, box.moved_to(detection.center))
+        return at_once(self._ask(outlook, detection, box))
+
+    def _ask(self, outlook: Outlook, detection: Detection,
+             box: BoundingBox) -> Asking[Sighting]:
+        """Return a detection as `weigh` does, and ask for what is measured."""
+        measured = None if self._meter is None else (yield from self._meter.ask(
+            outlook.view, box.moved_to(detection.center)))
         likeness = self._detector.likeness(detection) / self._first_likeness
         jump = math.dist(detection.center, outlook.expected.center) / outlook.expected.area**0.5
         presence = None if measured is None else measured.presence

@@ -15,8 +15,10 @@
 """Works whose asks are answered together."""
 
 from hypothesis import given, strategies as st
+import numpy as np
 import pytest
 
+from lmsco_ros.core.networks.extent import ExtentNet
 from lmsco_ros.core.networks.together import Ask, at_once, side_by_side
 
 
@@ -68,3 +70,11 @@ def test_work_alone_is_answered_at_once():
 def test_too_few_answers_are_an_error():
     with pytest.raises(ValueError):
         side_by_side({1: work(lambda subjects: [], [1])})
+
+
+def test_encodings_of_several_patches_are_those_of_each(rng, random_network):
+    network = random_network(ExtentNet)
+    patches = [rng.random((3, 64, 64), dtype=np.float32) for _ in range(3)]
+    for patch, encoding in zip(patches, network.encode_all(patches), strict=True):
+        assert encoding.shape == (1, 64, 8, 8)
+        np.testing.assert_allclose(encoding, network.encode(patch), atol=1e-5)
