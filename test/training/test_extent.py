@@ -199,10 +199,11 @@ def test_loss_is_least_at_the_truth_and_its_scale():
 
 def test_rendered_sequences_are_a_data_set(windows, tmp_path):
     from lmsco_ros.evaluation.datasets import scan_dataset
-    write_sequences(read_windows(windows, 'textures'), tmp_path, 2, seed=4)
+    write_sequences(read_windows(windows, 'textures'), tmp_path, 3, seed=4)
     sequences = scan_dataset(tmp_path).sequences
-    assert len(sequences) == 2 and sequences[0].frames[0].dtype == np.uint16
-    assert np.isfinite(sequences[1].ground_truth).all()
+    assert [sequence.name for sequence in sequences] == ['crowd_02', 'entering_00', 'view_01']
+    assert sequences[0].frames[0].dtype == np.uint16
+    assert np.isfinite(sequences[2].ground_truth).all()
 
 
 def run(windows, folder, monkeypatch, *arguments):

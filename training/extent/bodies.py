@@ -27,7 +27,7 @@ import math
 
 import torch
 
-__all__ = ['Bodies', 'PLANS', 'draw', 'edges', 'posed', 'sample_bodies']
+__all__ = ['Bodies', 'PLANS', 'chosen_of', 'draw', 'edges', 'posed', 'sample_bodies']
 
 PARTS = 8
 
@@ -165,6 +165,13 @@ def transformed(bodies: Bodies, turn: torch.Tensor, stretch: torch.Tensor,
                            sine * middles[..., 0] + cosine * middles[..., 1]], dim=-1)
     return replace(bodies, middles=middles, radii=bodies.radii * own,
                    turns=turns + turn[:, None])
+
+
+def chosen_of(which: torch.Tensor, ones: Bodies, others: Bodies) -> Bodies:
+    """Return of each pair of bodies the one where `which` is true, shape (n,), or the other."""
+    return Bodies(*(torch.where(which.view(-1, *[1] * (one.ndim - 1)), one, other)
+                    for one, other in zip(vars(ones).values(), vars(others).values(),
+                                          strict=True)))
 
 
 def edges(bodies: Bodies) -> torch.Tensor:

@@ -22,7 +22,8 @@ import math
 import torch
 from torch.nn import functional
 
-from training.extent.bodies import Bodies, draw, edges, posed, sample_bodies, transformed
+from training.extent.bodies import (
+    Bodies, chosen_of, draw, edges, posed, sample_bodies, transformed)
 from training.extent.windows import SIDE, Windows
 
 __all__ = ['ClipPairs', 'Pairs', 'RenderedPairs', 'StillPairs']
@@ -94,7 +95,8 @@ class RenderedPairs:
         boxes = extents * scales[..., None] + origins.repeat(1, 1, 2)
         fate = torch.rand(count, device=device)
         pictures, contrast = self._backgrounds(count), _contrasts(count, device)
-        pictures = self._beside(pictures, boxes, contrast)
+        for _ in range(2):
+            pictures = self._beside(pictures, bodies, boxes, contrast)
         softness = 0.4 + 1.2 * torch.rand(count, device=device)
         shades = self._shades(count)
         first = _painted(pictures[:, 0], draw(one, origins[:, 0], scales[:, 0], softness, SIDE),
@@ -102,8 +104,7 @@ class RenderedPairs:
         # One tenth is gone, another tenth has given its place to something else.
         other = sample_bodies(count, device)
         replaced = fate < 0.1
-        two = Bodies(*(torch.where(replaced.view(-1, *[1] * (a.ndim - 1)), b, a) for a, b in zip(
-            vars(two).values(), vars(other).values(), strict=True)))
+        two = chosen_of(replaced, other, two)
         cover, heat = draw(two, origins[:, 1], scales[:, 1], softness, SIDE)
         cover = cover * ((fate < 0.1) | (fate >= 0.2))[:, None, None]
         later = _painted(pictures[:, 1], (cover, heat), contrast, shades)
@@ -132,18 +133,25 @@ class RenderedPairs:
         smooth = blurred(seen, 3.0 * torch.rand(count, device=device))
         return smooth * strength[:, None, None, None] + ramp[:, None]
 
-    def _beside(self, pictures: torch.Tensor, boxes: torch.Tensor,
+    def _beside(self, pictures: torch.Tensor, targets: Bodies, boxes: torch.Tensor,
                 contrast: torch.Tensor) -> torch.Tensor:
-        """Return pictures with another body beside the target, about as warm, in one half."""
+        """
+        Return pictures with another body beside the target, about as warm, in one half.
+
+        Half of the others are of its kind, as in a crowd: they stand nearer, and touch it.
+        """
         count, device = len(pictures), pictures.device
-        bodies = sample_bodies(count, device)
+        alike = torch.rand(count, device=device) < 0.5
+        bodies = chosen_of(alike, posed(targets, torch.full((count,), 0.06, device=device)),
+                           sample_bodies(count, device))
         there = torch.rand(count, device=device) < 0.5
         side = _side(boxes[:, 0])
         angle = 2 * math.pi * torch.rand(count, device=device)
-        reach = (0.75 + 1.5 * torch.rand(count, device=device)) * side
-        reach = reach + 0.5 * side * torch.rand(count, device=device)
+        nearest = torch.where(alike, 0.45, 0.75)
+        reach = (nearest + 1.5 * torch.rand(count, device=device).square()) * side
         unit = side * torch.exp(0.3 * torch.randn(count, device=device)) / _side(edges(bodies))
-        kind = contrast * torch.exp(0.4 * torch.randn(count, device=device))
+        kind = contrast * torch.exp(torch.where(alike, 0.15, 0.4) * torch.randn(
+            count, device=device))
         result = []
         for k in range(2):
             middle = (boxes[:, k, :2] + boxes[:, k, 2:]) / 2

@@ -13,7 +13,7 @@
 # limitations under the License.
 
 """
-Rendered sequences with exact extents, to choose by: bodies that enter, turn, come near.
+Rendered sequences with exact extents, to choose by: bodies that enter, turn, come near, meet others.
 
     python -m training.extent.sequences --windows WINDOWS.npz --output FOLDER
 
@@ -24,6 +24,7 @@ trained on: each is a body, a background and a course of its own.
 from __future__ import annotations
 
 import argparse
+from dataclasses import dataclass
 from pathlib import Path
 
 import cv2
@@ -33,7 +34,9 @@ import torch
 from training.extent.bodies import Bodies, draw, edges, posed, sample_bodies, transformed
 from training.extent.windows import read_windows, Windows
 
-__all__ = ['rendered_sequence', 'write_sequences']
+__all__ = ['KINDS', 'rendered_sequence', 'write_sequences']
+
+KINDS = ('entering', 'view', 'crowd')
 
 SIDE = 160
 _FRAMES = 120
@@ -41,7 +44,56 @@ _POSE_FRAMES = 15
 _COUNTS = 40.0
 
 
-def rendered_sequence(textures: Windows, entering: bool) -> tuple[np.ndarray, np.ndarray]:
+@dataclass(frozen=True)
+class _Walk:
+    """
+    A body on its way.
+
+    Attributes
+    ----------
+    poses : list of Bodies
+        That it takes one after the other.
+    start, end : tensor, shape (2,)
+        Where it comes from and goes to, in pixels (x, y).
+    unit, growth : float
+        Pixels for a unit of its own at the start; its size at the end over that.
+    facing : bool
+        Whether it is mirrored.
+    narrow : float
+        Its width, when it shows its narrow side, as a part of that from the side.
+
+    """
+
+    poses: list[Bodies]
+    start: torch.Tensor
+    end: torch.Tensor
+    unit: float
+    growth: float
+    facing: bool
+    narrow: float
+
+    @classmethod
+    def of(cls, body: Bodies, side: float, entering: bool) -> _Walk:
+        """Return a random walk of a body that has a side in pixels at its start."""
+        poses = [posed(body, torch.tensor([0.07])) for _ in range(_FRAMES // _POSE_FRAMES + 2)]
+        extent = edges(body)[0]
+        start, end = _course(entering, side)
+        return cls(poses, start, end, side / float((extent[2:] - extent[:2]).prod().sqrt()),
+                   float(torch.exp(0.5 * torch.randn(1))), bool(torch.rand(1) < 0.5),
+                   1 - 0.45 * float(torch.rand(1)))
+
+    def at(self, index: int) -> tuple[Bodies, torch.Tensor, torch.Tensor]:
+        """Return the body in a frame, its place and its scale."""
+        part = index / (_FRAMES - 1)
+        turned = 1 - (1 - self.narrow) * abs(np.sin(3 * np.pi * part))
+        now = transformed(_between(self.poses, index / _POSE_FRAMES), torch.zeros(1),
+                          torch.tensor([[turned, 1.0]]), torch.tensor([self.facing]))
+        place = self.start + (self.end - self.start) * min(1.0, 1.5 * part)
+        place = place + torch.tensor([4 * np.sin(9 * part), 2 * np.sin(17 * part)])
+        return now, place[None].float(), torch.tensor([self.unit * self.growth**part])
+
+
+def rendered_sequence(textures: Windows, kind: str) -> tuple[np.ndarray, np.ndarray]:
     """
     Return the frames of a body on its way, and its boxes.
 
@@ -49,8 +101,9 @@ def rendered_sequence(textures: Windows, entering: bool) -> tuple[np.ndarray, np
     ----------
     textures : Windows
         One is the background.
-    entering : bool
-        Whether it comes in over a border of the image.
+    kind : str
+        One of `KINDS`: it comes in over a border of the image, it is in view, or others of its
+        kind walk beside it, behind it and before it.
 
     Returns
     -------
@@ -60,40 +113,32 @@ def rendered_sequence(textures: Windows, entering: bool) -> tuple[np.ndarray, np
         x, y, width, height of what is visible; NaN where that is less than two pixels.
 
     """
-    device = torch.device('cpu')
-    body = sample_bodies(1, device)
-    poses = [posed(body, torch.tensor([0.07])) for _ in range(_FRAMES // _POSE_FRAMES + 2)]
+    body = sample_bodies(1, torch.device('cpu'))
     side = float(12 * 4**torch.rand(1))
-    growth = float(torch.exp(0.5 * torch.randn(1)))
-    facing = bool(torch.rand(1) < 0.5)
-    stretch = 1 - 0.45 * float(torch.rand(1))
-    start, end = _course(entering, side)
-    unit = side / float((edges(body)[0, 2:] - edges(body)[0, :2]).prod().sqrt())
-    scene = _background(textures)
-    contrast = float(1.0 * 4**torch.rand(1))
+    target = _Walk.of(body, side, kind == 'entering')
+    others = [_Walk.of(body, side, False) for _ in range(4 if kind == 'crowd' else 0)]
+    scene, contrast = _background(textures), float(4**torch.rand(1))
     frames, boxes = [], []
     for index in range(_FRAMES):
-        part = index / (_FRAMES - 1)
-        turned = 1 - (1 - stretch) * abs(np.sin(3 * np.pi * part))
-        now = transformed(_between(poses, index / _POSE_FRAMES), torch.zeros(1),
-                          torch.tensor([[turned, 1.0]]), torch.tensor([facing]))
-        scale = torch.tensor([unit * growth**part])
-        place = start + (end - start) * min(1.0, 1.5 * part)
-        place = place + torch.tensor([4 * np.sin(9 * part), 2 * np.sin(17 * part)])
-        cover, heat = draw(now, place[None].float(), scale, torch.tensor([0.8]), SIDE)
-        picture = scene * (1 - cover[0]) + cover[0] * contrast * heat[0]
+        picture = scene
+        for walk in (*others[:2], target, *others[2:]):
+            now, place, scale = walk.at(index)
+            cover, heat = draw(now, place, scale, torch.tensor([0.8]), SIDE)
+            picture = picture * (1 - cover[0]) + cover[0] * contrast * heat[0]
+            if walk is target:
+                boxes.append(_visible(edges(now)[0] * scale + place[0].repeat(2)))
         noisy = picture + 0.08 * torch.randn(SIDE, SIDE)
         frames.append((8000 + _COUNTS * noisy).round().numpy().astype(np.uint16))
-        boxes.append(_visible(edges(now)[0] * scale + place.repeat(2)))
     return np.stack(frames), np.array(boxes)
 
 
 def write_sequences(textures: Windows, folder: Path, count: int, seed: int) -> None:
-    """Write sequences, every second one entering, in the layout of one folder for each."""
+    """Write sequences of all kinds in turn, each in a folder of its own."""
     torch.manual_seed(seed)
     for number in range(count):
-        frames, boxes = rendered_sequence(textures, entering=number % 2 == 0)
-        place = folder / 'rendered' / f'{number:02d}'
+        kind = KINDS[number % len(KINDS)]
+        frames, boxes = rendered_sequence(textures, kind)
+        place = folder / 'rendered' / f'{kind}_{number:02d}'
         (place / 'ir').mkdir(parents=True, exist_ok=True)
         for index, frame in enumerate(frames):
             cv2.imwrite(str(place / 'ir' / f'{index:05d}.png'), frame)
@@ -140,7 +185,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.split('\n\n')[0])
     parser.add_argument('--windows', type=Path, required=True)
     parser.add_argument('--output', type=Path, required=True)
-    parser.add_argument('--count', type=int, default=24)
+    parser.add_argument('--count', type=int, default=36)
     parser.add_argument('--seed', type=int, default=20)
     options = parser.parse_args()
     write_sequences(read_windows(options.windows, 'textures'), options.output, options.count,

@@ -16,7 +16,7 @@
 Train the network that measures the extent of a target.
 
     python -m training.extent.train --windows WINDOWS.npz [--output FOLDER] [--minutes N]
-        [--batch N] [--device NAME] [--without rendered|stills|clips|variance]
+        [--batch N] [--device NAME] [--start WEIGHTS] [--without rendered|stills|clips|variance]
 
 WINDOWS.npz is written by `python -m training.extent.windows`. Written are extent.safetensors,
 extent_log.csv, extent_curve.png and extent_report.csv.
@@ -158,6 +158,7 @@ def main() -> None:
     parser.add_argument('--minutes', type=float)
     parser.add_argument('--batch', type=int)
     parser.add_argument('--device', default='')
+    parser.add_argument('--start', type=Path, help='weights to go on from')
     parser.add_argument('--without', choices=('rendered', 'stills', 'clips', _VARIANCE))
     options = parser.parse_args()
     config = yaml.safe_load(CONFIG.read_text(encoding='utf-8'))
@@ -177,13 +178,22 @@ def main() -> None:
     held_out = {name: take(batches({name: source}, {name: 1.0}, held['size']), held['batches'])
                 for name, source in {**sources, 'clips': ClipPairs(windows['held_out'])}.items()}
     trained = {name: source for name, source in sources.items() if name != options.without}
-    network = ExtentNet()
+    network = _network(options.start)
     name = f'extent_without_{options.without}' if options.without else 'extent'
     train(network, ExtentObjective(options.without != _VARIANCE),
           batches(trained, settings['shares'], options.batch or settings['batch_size']),
           [batch for parts in held_out.values() for batch in parts], schedule,
           options.output / name)
     _finish(network.to(device), held_out, options.output, name)
+
+
+def _network(start: Path | None) -> ExtentNet:
+    """Return the network with the weights of a file, or with random ones."""
+    network = ExtentNet()
+    if start is not None:
+        network.load_state_dict({name: torch.from_numpy(array.astype('float32'))
+                                 for name, array in read_arrays(start).items()})
+    return network
 
 
 def _finish(network: ExtentNet, held_out: Mapping[str, list[Examples]], folder: Path,
