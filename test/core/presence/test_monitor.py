@@ -20,9 +20,10 @@ import numpy as np
 import pytest
 
 from lmsco_ros.core.config import PresenceConfig
+from lmsco_ros.core.presence import trust as trust_module
 from lmsco_ros.core.presence.evidence import Evidence, Verdict
 from lmsco_ros.core.presence.monitor import PresenceMonitor
-from lmsco_ros.core.presence.trust import trust
+from lmsco_ros.core.presence.trust import trust, TrustModel
 from lmsco_ros.core.types import TrackState
 
 CONFIG = PresenceConfig(reference_frames=4, uncertain=0.5, certain=0.6, lost=0.2,
