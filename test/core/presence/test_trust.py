@@ -19,7 +19,10 @@ import numpy as np
 import pytest
 
 from lmsco_ros.core.config import PresenceConfig
+from lmsco_ros.core.presence.evidence import Evidence
+from lmsco_ros.core.presence.monitor import PresenceMonitor
 from lmsco_ros.core.presence.trust import MEASURED, trust, UNMEASURED
+from lmsco_ros.core.types import TrackState
 
 
 @given(quality=st.floats(0.01, 6), likeness=st.floats(-1, 2), more=st.floats(0, 2),
@@ -74,3 +77,37 @@ def test_hints_count_up_to_their_limits(hints, limits):
 
 def test_what_is_not_measured_is_not_what_is_measured_without_a_result():
     assert trust(0.5, 0.5, None) != trust(0.5, 0.5, 0.0)
+
+
+@pytest.fixture
+def monitor():
+    """Return a monitor as it comes, with the coefficients that were fitted."""
+    return PresenceMonitor(PresenceConfig())
+
+
+def state_after(monitor, evidence, frames=1):
+    """Return the state after some frames that look all the same."""
+    for _ in range(frames):
+        state = monitor.judge(monitor.assess(evidence)).state
+    return state
+
+
+@pytest.mark.parametrize(('there', 'gone'), [(4.0, -5.0), (None, None)],
+                         ids=['measured', 'unmeasured'])
+def test_thresholds_suit_what_was_fitted(monitor, there, gone):
+    clear, nothing = Evidence(10.0, 1.0, there), Evidence(1.0, 0.0, gone)
+    assert state_after(monitor, clear, 20) is TrackState.TRACKING
+    assert state_after(monitor, nothing) is TrackState.UNCERTAIN
+    assert state_after(monitor, nothing, PresenceConfig().lost_frames) is TrackState.LOST
+    assert state_after(monitor, clear) is TrackState.TRACKING
+
+
+def test_target_that_the_network_hardly_knows_is_known_within_a_second(monitor):
+    """It is just certain at first; what is usual of it counts as much as of any other later."""
+    just = (PresenceConfig().uncertain + 1) / 2
+    odds = (np.log(just / (1 - just)) - MEASURED.constant - MEASURED.likeness) / MEASURED.presence
+    hardly = Evidence(10.0, 1.0, float(odds))
+    assert monitor.assess(hardly).score == pytest.approx(just) and odds < 3
+    assert state_after(monitor, hardly, 25) is TrackState.TRACKING
+    assert monitor.assess(hardly).presence == pytest.approx(4.0, abs=0.5)
+    assert monitor.assess(hardly).score > PresenceConfig().found
