@@ -15,14 +15,13 @@
 """What speaks for a detection: the detector and the network are replaced."""
 
 from types import SimpleNamespace
-from unittest.mock import create_autospec
 
 import numpy as np
 import pytest
 
 from lmsco_ros.core import BoundingBox
 from lmsco_ros.core.config import PresenceConfig
-from lmsco_ros.core.extent.measurement import ExtentMeter, Measurement
+from lmsco_ros.core.extent.measurement import Measurement
 from lmsco_ros.core.imaging.gain import IntensityRange
 from lmsco_ros.core.imaging.view import FrameView
 from lmsco_ros.core.networks.together import Ask, at_once
@@ -68,17 +67,25 @@ def detector():
     return Detector()
 
 
-def measured(presence):
-    """Return a measurement of something with these log-odds of being the target."""
-    return Measurement(np.array([[100, 118], [70, 92]]), np.ones((2, 2)), presence)
+class Meter:
+    """Gives everything log-odds of 3, unless told."""
+
+    def __init__(self):
+        self.presence, self.calls, self.measurements = 3.0, [], []
+
+    def ask(self, view, box):
+        self.calls.append((view, box))
+        return (yield Ask('meter', lambda turns: [self.measured() for _ in turns], box))
+
+    def measured(self):
+        edges = np.array([[100, 118], [70, 92]])
+        self.measurements.append(Measurement(edges, np.ones((2, 2)), self.presence))
+        return self.measurements[-1]
 
 
 @pytest.fixture
 def meter():
-    """Return a meter that gives everything log-odds of 3."""
-    meter = create_autospec(ExtentMeter, instance=True)
-    meter.return_value = measured(3.0)
-    return meter
+    return Meter()
 
 
 @pytest.fixture
@@ -127,9 +134,8 @@ def test_evidence_is_measured_against_first_frame_and_expected_place(
 def test_found_place_is_measured_in_the_looked_for_size(observer, detector, meter, outlook):
     detector.next = [seen((122.0, 89.0))]
     sighting = look(observer, outlook)
-    assert [made.args for made in meter.call_args_list] == [
-        (outlook.view, EXPECTED.moved_to((122.0, 89.0)))]
-    assert sighting.measurement is meter.return_value
+    assert meter.calls == [(outlook.view, EXPECTED.moved_to((122.0, 89.0)))]
+    assert [sighting.measurement] == meter.measurements
 
 
 def test_nothing_is_measured_without_a_network(detector, monitor, outlook):
@@ -138,7 +144,7 @@ def test_nothing_is_measured_without_a_network(detector, monitor, outlook):
 
 
 def test_odds_of_zero_are_odds(observer, meter, outlook):
-    meter.return_value = measured(0.0)
+    meter.presence = 0.0
     assert look(observer, outlook).assessment.evidence.presence == 0.0
 
 
@@ -148,7 +154,7 @@ def test_detection_elsewhere_is_weighed_in_its_own_box(observer, detector, meter
     assert detector.calls == [(outlook.view, box, (1.0,))]
     sighting = observer.weigh(outlook, found, box)
     assert (sighting.box, sighting.detection) == (box, found)
-    assert meter.call_args.args == (outlook.view, box)
+    assert meter.calls == [(outlook.view, box)]
     assert sighting.assessment.evidence.jump == pytest.approx(np.hypot(90, 66) / 20)
 
 
@@ -169,7 +175,7 @@ def test_what_was_there_beside_the_target_is_a_distractor(with_twin, detector, o
 
 
 def test_what_was_not_there_is_none(observer, meter, outlook):
-    meter.return_value = measured(-8.0)
+    meter.presence = -8.0
     observer.keep(outlook.view, LAST)
     assert not observer.is_distractor(outlook, seen(TWIN))
 
@@ -211,7 +217,7 @@ def test_known_distractors_are_watched_where_they_were(with_twin, detector, outl
 
 
 def test_frames_are_counted_and_distractors_forgotten_in_time(with_twin, meter, outlook):
-    meter.return_value = measured(-8.0)
+    meter.presence = -8.0
     for _ in range(60):
         look(with_twin, outlook)
     assert with_twin.is_distractor(outlook, seen(TWIN))
