@@ -126,7 +126,8 @@ def test_challenges_have_records_and_tables_of_their_own(lmsco, dataset, scripte
 
 
 def test_a_configuration_is_evaluated_beside_its_preset(lmsco, dataset, tmp_path):
-    (tmp_path / 'no_scale.yaml').write_text('preset: hcs\nscale: {estimator: none}\n')
+    (tmp_path / 'no_scale.yaml').write_text(
+        'preset: hcs\nscale: {exponent_min: 0, exponent_max: 0}\n')
     output = tmp_path / 'out'
     result = lmsco('evaluate', dataset, '--output', output, '--sequences', 'ste*', '--frames', 3,
                    '--tracker', f'config:{tmp_path}/no_scale.yaml', '--tracker', 'hcs')

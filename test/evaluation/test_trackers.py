@@ -124,10 +124,11 @@ def config_file(tmp_path):
 
 
 def test_a_configuration_in_a_file_is_a_tracker_of_its_own(config_file):
-    spec = resolve(config_file('preset: hcs\nscale: {estimator: none}\n', 'no_scale.v2.yaml'))
+    spec = resolve(config_file(
+        'preset: hcs\nscale: {exponent_min: 0, exponent_max: 0}\n', 'no_scale.v2.yaml'))
     assert spec.name == 'no_scale.v2'
     assert spec.config == TrackerConfig.from_dict(
-        {'preset': 'hcs', 'scale': {'estimator': 'none'}})
+        {'preset': 'hcs', 'scale': {'exponent_min': 0, 'exponent_max': 0}})
     sent = pickle.loads(pickle.dumps(spec))
     assert sent == spec and sent.identity == spec.identity
     tracker = sent.build()
@@ -138,7 +139,7 @@ def test_a_configuration_in_a_file_is_a_tracker_of_its_own(config_file):
 def test_identity_follows_settings_and_code(monkeypatch, config_file):
     assert resolve('hcs').identity == resolve('hcs').identity
     # The same settings, however they are written; the name of the file is not one of them.
-    same = resolve(config_file('preset: hcs\nscale: {estimator: search}\n'))
+    same = resolve(config_file('preset: hcs\nscale: {exponent_min: -4}\n'))
     assert same.identity == resolve('hcs').identity
     others = [resolve(config_file(f'preset: hcs\n{text}\n')) for text in (
         'sampling: {newton_steps: 4}', 'motion: {least_motion: 0.4}', 'runtime: {threads: 2}')]

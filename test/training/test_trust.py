@@ -20,6 +20,8 @@ import pytest
 
 from lmsco_ros.core import TrackerConfig
 from lmsco_ros.evaluation.datasets import TrackingSequence
+from lmsco_ros.evaluation.split import load_split
+from training.sources import SPLIT
 from training.trust import fit, main, record, Records, separation
 
 ABSENT = range(12, 18)
@@ -61,18 +63,27 @@ def test_fit_separates_what_can_be_separated():
     assert separation(records, [0], weights[[0, 3]]) < 0.7
 
 
+KNOWN = sorted(load_split(SPLIT).parts['train'])[0]
+
+
 @pytest.mark.parametrize(('words', 'reason'), [
+    (('--data', '{folder}/empty'), 'arguments are required: --rendered'),
     (('--data', '{folder}/missing'), 'missing holds no folder thermal_dev'),
-    (('--data', '{folder}/empty'), 'holds no sequence'),
-    (('--data', '{folder}/other'), "no sequence of this dataset is in part 'train'"),
-    (('--data', '{folder}/empty', '--frames', '1'), 'at least 2 are needed'),
+    (('--data', '{folder}/empty', '--rendered', '{folder}'), 'thermal_dev holds no sequence'),
+    (('--data', '{folder}/other', '--rendered', '{folder}'),
+     "no sequence of this dataset is in part 'train'"),
+    (('--data', '{folder}/empty', '--rendered', '{folder}', '--frames', '1'),
+     'at least 2 are needed'),
+    (('--data', '{folder}/known', '--rendered', '{folder}/missing'), 'missing is not a folder'),
+    (('--data', '{folder}/known', '--rendered', '{folder}/empty'), 'empty holds no sequence'),
 ])
 def test_data_that_is_not_there_is_told_in_a_line(tmp_path, capsys, words, reason):
     (tmp_path / 'empty' / 'thermal_dev').mkdir(parents=True)
-    other = tmp_path / 'other' / 'thermal_dev' / 'group' / 'clip'
-    other.mkdir(parents=True)
-    cv2.imwrite(str(other / '1.png'), np.zeros((20, 20), np.uint8))
-    (other / 'groundtruth.txt').write_text('1,2,3,4')
+    for clip in (tmp_path / 'other' / 'thermal_dev' / 'group' / 'clip',
+                 tmp_path / 'known' / 'thermal_dev' / KNOWN):
+        clip.mkdir(parents=True)
+        cv2.imwrite(str(clip / '1.png'), np.zeros((20, 20), np.uint8))
+        (clip / 'groundtruth.txt').write_text('1,2,3,4')
     with pytest.raises(SystemExit) as end:
         main([word.format(folder=tmp_path) for word in words])
     assert end.value.code == 2

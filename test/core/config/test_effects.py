@@ -16,6 +16,7 @@
 
 from dataclasses import fields, is_dataclass
 from functools import cache
+import math
 import typing
 from typing import NamedTuple
 
@@ -31,6 +32,7 @@ from lmsco_ros.core.features.motion import MotionObserver
 from lmsco_ros.core.imaging.gain import AutomaticGain
 from lmsco_ros.core.presence.evidence import Evidence
 from lmsco_ros.core.presence.monitor import PresenceMonitor
+from lmsco_ros.core.presence.trust import MEASURED
 from lmsco_ros.core.search.schedule import Schedule
 
 VISIBLE = 2e-3
@@ -139,13 +141,20 @@ def flow(config, scene):
     return [0.0] if images is None else [1.0, *cv2.resize(images[0], (10, 10)).ravel()]
 
 
+def scored(score, quality=1.0, likeness=0.5):
+    """Return the hints of a score, whichever coefficients were fitted; usual are 20 and 4."""
+    odds = math.log(score / (1 - score)) - (
+        MEASURED.constant + MEASURED.quality * math.log(quality) + MEASURED.likeness * likeness)
+    return 20 * quality, likeness, odds / MEASURED.presence, 0
+
+
 # Clear frames, sharper and sharper ones; fading, half back, and gone; then, for a moment each,
 # what is not sharp, not alike, or not quite enough; at last the target.
 STORY = [Evidence(*hints) for hints in (
     *3 * [(10, 1, 4, 0)], *6 * [(20, 1, 4, 0)], *3 * [(10, 1, 4, 0)],
-    (4, .5, 0, 0), (5, .5, 0, 0), (6, .6, 0, 0), (4, .3, -1, 0), (10, .7, 0, 0), (10, 1, 4, 0),
+    scored(.6), scored(.45), scored(.85), (10, 1, 4, 0),
     *4 * [(1, 0, -5, 0)], (3, .3, -2, 0), *3 * [(1, 0, -5, 0)],
-    (4, 1.2, 8, 2), (20, .28, 6, 2), (10, .4, 1, 2), (14, 1, 4, 2))]
+    (4, 1.2, 8, 2), (20, .28, 6, 2), scored(.85, .45, .35), (14, 1, 4, 2))]
 
 
 def verdicts(config, scene):

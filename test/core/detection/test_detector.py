@@ -121,10 +121,12 @@ def test_peak_is_refined_between_the_points_of_the_grid(detector, evaluate, scen
     assert detection.peak.value > max(around)
 
 
-def test_sample_is_recentered_at_the_peak(detector, scene, evaluate):
+@pytest.mark.parametrize('beside', [(0.0, 0.0), (2.5, -1.5)], ids=['peak', 'beside it'])
+def test_sample_has_a_place_at_its_origin(detector, scene, evaluate, beside):
     detection = detector(view(scene.frame((83.0, 58.0))), BOX)
-    ty, tx = detection.peak.displacement
-    for block, moved in zip(detection.sample, detection.recentered_sample(), strict=True):
+    center = tuple(np.add(detection.center, beside))
+    ty, tx = detection.displacement_to(center)
+    for block, moved in zip(detection.sample, detection.sample_around(center), strict=True):
         for y, x in ((0.0, 0.0), (0.2, -0.3)):
             assert evaluate(moved[..., 0], y, x) == pytest.approx(
                 evaluate(block[..., 0], y + ty, x + tx), abs=1e-6)
@@ -140,7 +142,8 @@ def test_first_filter_never_changes(detector, scene, make_scene):
     detection = detector(first, BOX)
     likeness = detector.likeness(detection)
     for _ in range(8):
-        detector.remember(detector(other, BOX))
+        seen = detector(other, BOX)
+        detector.remember(seen, seen.center)
         detector.train()
     assert detector.likeness(detection) == likeness
     # While the one that learns does.
@@ -167,20 +170,23 @@ def test_likeness_is_that_of_the_place_even_beside_a_maximum(detector, scene, ev
 def test_filter_learns_what_it_is_given_only_when_it_trains(detector, make_scene):
     other = view(make_scene(seed=8).frame(CENTER))
     detection = detector(other, BOX)
-    detector.remember(detection)
+    detector.remember(detection, detection.center)
     assert detector(other, BOX).peak.value == detection.peak.value
     detector.train()
     assert detector(other, BOX).peak.value > detection.peak.value
 
 
-def test_remembered_target_is_at_the_origin(detector, make_scene):
+@pytest.mark.parametrize('offset', [(0.0, 0.0), (5.0, -4.0)], ids=['its peak', 'beside it'])
+def test_target_is_learned_where_it_is_known_to_be(detector, make_scene, offset):
+    """As far off the place it is seen at later as its center was off the peak."""
     other = make_scene(seed=8)
     moved = detector(view(other.frame((CENTER[0] + 6, CENTER[1] - 4))), BOX)
+    center = (CENTER[0] + 6 + offset[0], CENTER[1] - 4 + offset[1])
     for _ in range(10):
-        detector.remember(moved)
+        detector.remember(moved, center)
         detector.train()
     seen = detector(view(other.frame(CENTER)), BOX)
-    assert seen.center == pytest.approx(CENTER, abs=1.5)
+    assert seen.center == pytest.approx(np.add(CENTER, offset), abs=1.5)
 
 
 def test_peak_near_a_place_is_found_beside_a_higher_one(detector, scene, evaluate):

@@ -12,19 +12,19 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What speaks for a detection: the detector, the comparison and the monitor are replaced."""
+"""What speaks for a detection: the detector and the network are replaced."""
 
 from types import SimpleNamespace
-from unittest.mock import create_autospec
 
 import numpy as np
 import pytest
 
 from lmsco_ros.core import BoundingBox
 from lmsco_ros.core.config import PresenceConfig
+from lmsco_ros.core.extent.measurement import Measurement
 from lmsco_ros.core.imaging.gain import IntensityRange
 from lmsco_ros.core.imaging.view import FrameView
-from lmsco_ros.core.presence.comparison import Comparison
+from lmsco_ros.core.networks.together import Ask, at_once
 from lmsco_ros.core.presence.evidence import Evidence
 from lmsco_ros.core.presence.monitor import PresenceMonitor
 from lmsco_ros.core.presence.observer import Observer, Outlook
@@ -45,6 +45,10 @@ class Detector:
         self.calls.append((view, box, factors))
         return self.next.pop(0) if self.next else seen(box.center)
 
+    def ask(self, view, box, factors):
+        return (yield Ask('detector', lambda turns: [self(*turn) for turn in turns],
+                          (view, box, factors)))
+
     def likeness(self, detection):
         return detection.likeness
 
@@ -63,12 +67,25 @@ def detector():
     return Detector()
 
 
+class Meter:
+    """Gives everything log-odds of 3, unless told."""
+
+    def __init__(self):
+        self.presence, self.calls, self.measurements = 3.0, [], []
+
+    def ask(self, view, box):
+        self.calls.append((view, box))
+        return (yield Ask('meter', lambda turns: [self.measured() for _ in turns], box))
+
+    def measured(self):
+        edges = np.array([[100, 118], [70, 92]])
+        self.measurements.append(Measurement(edges, np.ones((2, 2)), self.presence))
+        return self.measurements[-1]
+
+
 @pytest.fixture
-def comparison():
-    """Return a comparison that gives everything log-odds of 3."""
-    comparison = create_autospec(Comparison, instance=True)
-    comparison.return_value = 3.0
-    return comparison
+def meter():
+    return Meter()
 
 
 @pytest.fixture
@@ -77,8 +94,8 @@ def monitor():
 
 
 @pytest.fixture
-def observer(detector, comparison, monitor):
-    return Observer(detector, comparison, monitor, FIRST)
+def observer(detector, meter, monitor):
+    return Observer(detector, meter, monitor, FIRST)
 
 
 def view():
@@ -91,58 +108,53 @@ def outlook():
     return Outlook(view(), LAST, EXPECTED)
 
 
+def look(observer, outlook, factors=(1.0,)):
+    """Return what an observer sees, asked alone."""
+    return at_once(observer.look(outlook, factors))
+
+
 def test_target_is_looked_for_where_it_is_expected(observer, detector, outlook):
     detector.next = [seen((112.0, 85.0))]
-    sighting = observer.look(outlook, (0.9, 1.0))
+    sighting = look(observer, outlook, (0.9, 1.0))
     assert detector.calls == [(outlook.view, EXPECTED, (0.9, 1.0))]
     assert sighting.box == EXPECTED and sighting.detection.center == (112.0, 85.0)
     assert detector.neared == []
 
 
 def test_evidence_is_measured_against_first_frame_and_expected_place(
-        observer, detector, comparison, monitor, outlook):
+        observer, detector, monitor, outlook):
     detector.next = [seen((122.0, 89.0), sharpness=7.0, likeness=0.25)]
-    sighting = observer.look(outlook, (1.0,))
+    sighting = look(observer, outlook)
     evidence = sighting.assessment.evidence
     # The filter of the first frame says half of what it did there; the jump is 13 pixels.
     assert evidence == Evidence(7.0, 0.5, 3.0, pytest.approx(13 / 20))
     assert sighting.assessment == monitor.assess(evidence)
 
 
-def test_first_frame_and_found_place_are_compared_in_the_looked_for_size(
-        observer, detector, comparison, outlook):
+def test_found_place_is_measured_in_the_looked_for_size(observer, detector, meter, outlook):
     detector.next = [seen((122.0, 89.0))]
-    observer.look(outlook, (1.0,))
-    assert [made.args for made in comparison.call_args_list] == [
-        (outlook.view, EXPECTED.moved_to((122.0, 89.0)))]
+    sighting = look(observer, outlook)
+    assert meter.calls == [(outlook.view, EXPECTED.moved_to((122.0, 89.0)))]
+    assert [sighting.measurement] == meter.measurements
 
 
-def test_nothing_is_compared_without_a_network(detector, monitor, outlook):
-    observer = Observer(detector, None, monitor, FIRST)
-    assert observer.look(outlook, (1.0,)).assessment.evidence.presence is None
+def test_nothing_is_measured_without_a_network(detector, monitor, outlook):
+    sighting = look(Observer(detector, None, monitor, FIRST), outlook)
+    assert sighting.assessment.evidence.presence is None and sighting.measurement is None
 
 
-def test_comparison_of_the_frame_before_stands_without_doubt(observer, comparison, outlook):
-    sighting = observer.look(outlook, (1.0,), presence=2.0)
-    assert sighting.assessment.evidence.presence == 2.0 and sighting.box == EXPECTED
-    comparison.assert_not_called()
-    # No doubt about zero either.
-    assert observer.look(outlook, (1.0,), presence=0.0).assessment.evidence.presence == 0.0
+def test_odds_of_zero_are_odds(observer, meter, outlook):
+    meter.presence = 0.0
+    assert look(observer, outlook).assessment.evidence.presence == 0.0
 
 
-def test_doubt_is_settled_by_a_comparison(observer, comparison, outlook):
-    sighting = observer.look(outlook, (1.0,), presence=-8.0)
-    comparison.assert_called_once()
-    assert sighting.assessment.evidence.presence == 3.0
-
-
-def test_detection_elsewhere_is_weighed_in_its_own_box(observer, detector, comparison, outlook):
+def test_detection_elsewhere_is_weighed_in_its_own_box(observer, detector, meter, outlook):
     box = BoundingBox.from_center((200, 150), (14, 11))
     found = observer.detect(outlook, box)
     assert detector.calls == [(outlook.view, box, (1.0,))]
     sighting = observer.weigh(outlook, found, box)
     assert (sighting.box, sighting.detection) == (box, found)
-    assert comparison.call_args.args == (outlook.view, box)
+    assert meter.calls == [(outlook.view, box)]
     assert sighting.assessment.evidence.jump == pytest.approx(np.hypot(90, 66) / 20)
 
 
@@ -162,14 +174,14 @@ def test_what_was_there_beside_the_target_is_a_distractor(with_twin, detector, o
     assert detector.neared[0][1] == TWIN
 
 
-def test_what_was_not_there_is_none(observer, comparison, outlook):
-    comparison.return_value = -8.0
+def test_what_was_not_there_is_none(observer, meter, outlook):
+    meter.presence = -8.0
     observer.keep(outlook.view, LAST)
     assert not observer.is_distractor(outlook, seen(TWIN))
 
 
 def test_kept_frame_is_asked_for_the_peak_at_the_place_itself(observer, detector, outlook):
-    # Something else stands out in the region, and the comparison is made where it was asked for.
+    # Something else stands out in the region, and what is measured lies where it was asked for.
     observer.keep(outlook.view, LAST)
     detector.next = [seen((180.0, 90.0), likeness=-5.0)]
     assert observer.is_distractor(outlook, seen(TWIN))
@@ -188,7 +200,7 @@ def test_forgotten_distractors_are_none(with_twin, outlook):
 def test_target_is_looked_for_beside_a_distractor(with_twin, detector, outlook):
     distractor = seen(TWIN)
     detector.next, detector.neared = [distractor], []
-    sighting = with_twin.look(outlook, (1.0,))
+    sighting = look(with_twin, outlook)
     assert detector.neared == [(distractor, EXPECTED.center)]
     assert sighting.detection.center == EXPECTED.center
 
@@ -204,10 +216,10 @@ def test_known_distractors_are_watched_where_they_were(with_twin, detector, outl
     assert detector.calls == [(outlook.view, EXPECTED.moved_to(moved), (1.0,))]
 
 
-def test_frames_are_counted_and_distractors_forgotten_in_time(with_twin, comparison, outlook):
-    comparison.return_value = -8.0
+def test_frames_are_counted_and_distractors_forgotten_in_time(with_twin, meter, outlook):
+    meter.presence = -8.0
     for _ in range(60):
-        with_twin.look(outlook, (1.0,))
+        look(with_twin, outlook)
     assert with_twin.is_distractor(outlook, seen(TWIN))
-    with_twin.look(outlook, (1.0,))
+    look(with_twin, outlook)
     assert not with_twin.is_distractor(outlook, seen(TWIN))
