@@ -167,6 +167,11 @@ class TargetState:
         return x, y
 
     @property
+    def velocity_covariance(self) -> npt.NDArray[np.float64]:
+        """Covariance of the velocity in (px per frame)^2, shape (2, 2)."""
+        return self._covariance[_SPEED, _SPEED].copy()
+
+    @property
     def covariance(self) -> npt.NDArray[np.float64]:
         """Covariance of center x, center y, width and height in px^2, shape (4, 4)."""
         sizes = np.exp(self._mean[_SIZE])

@@ -199,4 +199,5 @@ class Track:
             centered_map(detection.peak.grid / self._first_peak), detection.region,
             velocity=(self._clock.rate * x, self._clock.rate * y),
             covariance=self._motion.covariance,
-            predicted_box=visible_part(clamp_box(self._motion.box, view.size), view.size))
+            predicted_box=visible_part(clamp_box(self._motion.box, view.size), view.size),
+            velocity_covariance=self._clock.rate**2 * self._motion.velocity_covariance)

@@ -178,10 +178,12 @@ class TrackResult:
     predicted_box : BoundingBox or None
         The target in this frame by its motion and what was measured: close to `box` while the
         target is seen, and where it has gone on to meanwhile, as far as one can tell, when not.
+    velocity_covariance : ndarray, shape (2, 2), or None
+        Covariance of `velocity`, in the square of its unit.
 
     Notes
     -----
-    The last three are None only in results that no tracker has made.
+    The last four are None only in results that no tracker has made.
 
     """
 
@@ -193,3 +195,4 @@ class TrackResult:
     velocity: tuple[float, float] | None = None
     covariance: npt.NDArray[np.float64] | None = None
     predicted_box: BoundingBox | None = None
+    velocity_covariance: npt.NDArray[np.float64] | None = None

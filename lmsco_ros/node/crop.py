@@ -83,8 +83,10 @@ class Crop:
 
     def outwards(self, result: TrackResult) -> TrackResult:
         """Return a result found in what remains, in pixels of the full image."""
+        predicted = result.predicted_box
         return replace(result, box=self._outwards(result.box),
-                       search_region=self._outwards(result.search_region))
+                       search_region=self._outwards(result.search_region),
+                       predicted_box=None if predicted is None else self._outwards(predicted))
 
     def _outwards(self, box: BoundingBox) -> BoundingBox:
         return replace(box, x=box.x + self.left, y=box.y + self.top)

@@ -152,6 +152,8 @@ def test_other_pixels_change_the_units_alone(factor):
         [factor * side for side in plain.box.as_tuple()], rel=1e-9)
     assert other.velocity == pytest.approx([factor * v for v in plain.velocity], rel=1e-9)
     np.testing.assert_allclose(other.covariance, factor**2 * plain.covariance, rtol=1e-9)
+    np.testing.assert_allclose(
+        other.velocity_covariance, factor**2 * plain.velocity_covariance, rtol=1e-9)
 
 
 def test_half_the_frame_rate_changes_the_velocity_per_frame_alone():
@@ -301,3 +303,13 @@ def test_times_are_given_for_every_frame_or_for_none(first, second):
 def test_any_real_number_is_a_time(whole_seconds, numeric):
     clock = FrameClock(numeric(whole_seconds))
     assert clock.step(numeric(whole_seconds + 1)) == 30.0
+
+
+def test_velocity_is_as_sure_as_what_was_seen():
+    blurred = followed(20, covariance=100 * EXACT)
+    told = [np.linalg.eigvalsh(state.velocity_covariance)
+            for state in (followed(20), blurred, TargetState(START))]
+    assert 0 < told[0].min() and (told[0] < told[1]).all() and (told[1] < told[2]).all()
+    # Handed out: nobody can change the state by it.
+    blurred.velocity_covariance[...] = 0
+    assert blurred.velocity_covariance.any()

@@ -15,6 +15,8 @@
 
 """What is cut off is unseen by the tracker, and nobody else notices."""
 
+from dataclasses import replace
+
 from hypothesis import given, strategies as st
 import numpy as np
 import pytest
@@ -40,6 +42,8 @@ def test_a_pixel_keeps_its_place_in_the_full_image(crop):
     assert remaining[int(inside.y), int(inside.x)] == image[8, 10]
     result = TrackResult(inside, 1.0, TrackState.TRACKING, np.zeros((1, 1), np.float32), inside)
     assert crop.outwards(result).box == crop.outwards(result).search_region == place
+    assert crop.outwards(result).predicted_box is None
+    assert crop.outwards(replace(result, predicted_box=inside)).predicted_box == place
     filled = crop.fill((remaining % 256).astype(np.uint8))
     assert filled.shape == image.shape and filled[8, 10] == image[8, 10] % 256
 
