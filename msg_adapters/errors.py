@@ -29,3 +29,11 @@ class BoxMessageError(MessageError):
 
 class StatusMessageError(MessageError):
     """The diagnostic message is not one that this package wrote."""
+
+
+class StateMessageError(MessageError):
+    """The state has a number that is not finite, or the odometry is not that of a target."""
+
+
+class CameraInfoError(MessageError):
+    """The camera is not calibrated, or its model cannot be used."""
