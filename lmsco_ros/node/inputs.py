@@ -29,7 +29,7 @@ from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.qos import HistoryPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.serialization import deserialize_message
 from rclpy.subscription import Subscription
-from sensor_msgs.msg import CompressedImage, Image, RegionOfInterest
+from sensor_msgs.msg import CameraInfo, CompressedImage, Image, RegionOfInterest
 from std_msgs.msg import Header, UInt32
 
 from lmsco_ros.core.errors import LMSCOError
@@ -76,11 +76,14 @@ class Inputs:
         Is told of every image.
     refuse : callable
         Called with the header and the reason when a message cannot be used.
+    calibrate : callable
+        Called with every camera_info.
 
     """
 
     def __init__(self, node: GuardedNode, settings: Settings, worker: TrackerWorker,
-                 monitor: HealthMonitor, refuse: Callable[..., None]) -> None:
+                 monitor: HealthMonitor, refuse: Callable[..., None],
+                 calibrate: Callable[[CameraInfo], None]) -> None:
         self._node = node
         self._worker = worker
         self._monitor = monitor
@@ -90,6 +93,9 @@ class Inputs:
         with contextlib.ExitStack() as made:
             self._image_type, self._images = self._subscribe_images(settings)
             made.callback(node.destroy_subscription, self._images)
+            made.callback(node.destroy_subscription, node.create_subscription(
+                CameraInfo, 'camera_info', calibrate, QoSProfile(
+                    depth=1, reliability=_RELIABILITY[settings.image_reliability])))
             for kind, topic, callback in (
                     (RegionOfInterest, 'init_box', self._on_region),
                     (PolygonStamped, 'init_box_stamped', self._on_polygon),

@@ -34,6 +34,7 @@ from lmsco_ros.core.types import TrackResult, TrackState
 from lmsco_ros.node.diagnostics import frame_statuses, Readings
 from lmsco_ros.node.outcome import Outcome
 from lmsco_ros.node.parameters import Settings
+from lmsco_ros.node.state_outputs import StateOutputs
 from lmsco_ros.node.target_temperature import celsius, target_reading
 from lmsco_ros.visualization.display_range import DisplayRange
 from lmsco_ros.visualization.overlay import draw_targets, state_color
@@ -58,6 +59,11 @@ class Outputs:
     settings : Settings
         How pictures are drawn and counts are told; may be replaced while running.
 
+    Attributes
+    ----------
+    states : StateOutputs
+        What a robot steers by.
+
     """
 
     def __init__(self, node: LifecycleNode, settings: Settings) -> None:
@@ -68,6 +74,8 @@ class Outputs:
         with contextlib.ExitStack() as made:
             self._box = self._publisher(PolygonStamped, 'box', made)
             self._boxes = self._publisher(PolygonInstanceStamped, 'boxes', made)
+            self.states = StateOutputs(
+                lambda kind, name: self._publisher(kind, name, made), node.get_logger().warning)
             self._status = self._publisher(DiagnosticArray, 'status', made)
             self._confidence = self._publisher(Image, 'confidence_map', made)
             self._overlay = self._publisher(Image, 'overlay', made)
@@ -94,6 +102,9 @@ class Outputs:
             self._box.publish(polygon_from_box(found[outcome.track_id].box.as_tuple(), header))
         for number, each in found.items():
             self._boxes.publish(instance_from_box(each.box.as_tuple(), number, header))
+        if outcome.image is not None:
+            height, width = crop.full_shape(outcome.image)
+            self.states.publish(results, outcome.track_id, (width, height), header)
         published = time.monotonic()
         self.publish_statuses(frame_statuses(
             outcome, dropped_frames, published,

@@ -73,7 +73,8 @@ class TrackingSession:
         monitor.restart()
         self.worker.start()
         try:
-            self._inputs = Inputs(node, settings, self.worker, monitor, self._refuse)
+            self._inputs = Inputs(node, settings, self.worker, monitor, self._refuse,
+                                  outputs.states.calibrate)
         except Exception:
             self.worker.stop(_STOP_SECONDS)
             raise

@@ -95,7 +95,11 @@ class FakeTracker:
             raise error
 
     def _result(self, box, state):
-        return TrackResult(box, 0.75, state, np.full((4, 4), 0.5, np.float32), box)
+        return TrackResult(
+            box, 0.75, state, np.full((4, 4), 0.5, np.float32), box, velocity=(30.0, -15.0),
+            covariance=np.diag([1.0, 4.0, 9.0, 16.0]),
+            predicted_box=BoundingBox(box.x + 2, box.y + 1, *box.size),
+            velocity_covariance=np.array([[25.0, 5.0], [5.0, 36.0]]))
 
 
 class Graph:
