@@ -13,7 +13,7 @@
 # limitations under the License.
 
 """
-Boxes: regions, polygons and detections <-> four numbers.
+Boxes: regions, polygons and detections <-> four numbers; points on them.
 
 A box is the tuple (x, y, width, height) in pixels, (x, y) its top-left corner; pixel
 (0, 0) covers [0, 1) x [0, 1).
@@ -28,7 +28,7 @@ import math
 from typing import Any, NamedTuple
 
 from geometry_msgs.msg import (
-    Point32, Polygon, PolygonInstance, PolygonInstanceStamped, PolygonStamped)
+    Point32, PointStamped, Polygon, PolygonInstance, PolygonInstanceStamped, PolygonStamped)
 import numpy as np
 from sensor_msgs.msg import RegionOfInterest
 from std_msgs.msg import Header
@@ -101,6 +101,23 @@ def polygon_from_box(box: Sequence[float], header: Header | None = None) -> Poly
     """Return the corners of `box`, clockwise (as seen) from the top left."""
     corners = [Point32(x=x, y=y) for x, y in corners_of_box(box)]
     return PolygonStamped(header=header or Header(), polygon=Polygon(points=corners))
+
+
+def point_from_message(message: PointStamped) -> tuple[float, float]:
+    """
+    Return the image position (x, y) of a point, in pixels; its z says nothing.
+
+    Raises
+    ------
+    BoxMessageError
+        When a number is not finite.
+
+    """
+    point = message.point.x, message.point.y
+    if not all(map(math.isfinite, point)):
+        raise BoxMessageError(f'the point {point} has a number that is not finite; expected '
+                              '(x, y) in pixels of the image')
+    return point
 
 
 def instance_from_box(box: Sequence[float], track_id: int,

@@ -138,8 +138,8 @@ class Camera:
         if not missed <= _INVERSE_ERROR:
             raise CameraInfoError(
                 f'the distortion of the camera_info ({self.model}) has no inverse where the '
-                'target is; expected a calibration that holds for the whole image: calibrate with points '
-                'up to its edges')
+                'target is; expected a calibration that holds for the whole image: calibrate '
+                'with points up to its edges')
         rays = np.column_stack((normalized, np.ones(len(normalized))))
         rays /= np.linalg.norm(rays, axis=1, keepdims=True)
         return Ray(rays[0], np.column_stack((rays[1] - rays[2], rays[3] - rays[4])) / (2 * _STEP))

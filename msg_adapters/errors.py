@@ -24,7 +24,7 @@ class ImageMessageError(MessageError):
 
 
 class BoxMessageError(MessageError):
-    """The box is empty, not finite, or cannot be expressed in the message."""
+    """The box or point is empty, not finite, or cannot be expressed in the message."""
 
 
 class StatusMessageError(MessageError):

@@ -81,6 +81,10 @@ class Crop:
         """Return a box of the full image, as seen in what remains."""
         return replace(box, x=box.x - self.left, y=box.y - self.top)
 
+    def inwards_point(self, point: tuple[float, float]) -> tuple[float, float]:
+        """Return a point (x, y) of the full image, as seen in what remains."""
+        return point[0] - self.left, point[1] - self.top
+
     def outwards(self, result: TrackResult) -> TrackResult:
         """Return a result found in what remains, in pixels of the full image."""
         predicted = result.predicted_box

@@ -23,7 +23,7 @@ import numpy.typing as npt
 from lmsco_ros.core.errors import LMSCOError
 from lmsco_ros.core.types import BoundingBox, TrackResult, TrackState
 from lmsco_ros.node.history import NANOSECONDS
-from lmsco_ros.node.outcome import StartAnswer, Tracker
+from lmsco_ros.node.outcome import Place, StartAnswer, Tracker
 
 
 class FollowedTargets:
@@ -75,7 +75,7 @@ class FollowedTargets:
         """Choose a target, until another one is started."""
         self._chosen = number
 
-    def start(self, image: npt.NDArray, time: float, box: BoundingBox, *,
+    def start(self, image: npt.NDArray, time: float, place: Place, *,
               follow: bool) -> tuple[dict[int, TrackResult], StartAnswer]:
         """
         Start on a target.
@@ -86,8 +86,8 @@ class FollowedTargets:
             Frame that shows it.
         time : float
             When that was taken, in seconds.
-        box : BoundingBox
-            The target.
+        place : BoundingBox, or tuple of float
+            The target, or a point on it.
         follow : bool
             Whether it is the next frame of the others as well.
 
@@ -101,7 +101,7 @@ class FollowedTargets:
         staying = [number for number in self._results if number not in replaced]
         results = dict(self.step(image, time, staying)) if follow and staying else {}
         try:
-            number = self._tracker.initialize(image, box, time, replaced)
+            number = self._begin(image, time, place, replaced)
         except LMSCOError as error:
             return results, StartAnswer(reason=str(error))
         self._latest, self._chosen = number, number
@@ -138,6 +138,13 @@ class FollowedTargets:
         """Drop all."""
         self._tracker.reset()
         self._results, self._lost_since = {}, {}
+
+    def _begin(self, image: npt.NDArray, time: float, place: Place,
+               replaced: Collection[int]) -> int:
+        """Let the tracker start."""
+        if isinstance(place, BoundingBox):
+            return self._tracker.initialize(image, place, time, replaced)
+        return self._tracker.initialize_at(image, place, time, replaced)
 
     @property
     def _least(self) -> int:

@@ -71,16 +71,14 @@ class FallbackTracker:
     def initialize(self, image: npt.NDArray, box: BoundingBox, time: float,
                    in_place_of: Collection[int] = ()) -> int:
         """Start on a target in place of others, in a frame taken at a time; return its number."""
-        number = self._attempt(lambda: self._start(image, box, time, in_place_of))
-        if number is None:
-            self._resume()
-            number = self._start(image, box, time, in_place_of)
-        self._started += 1
-        self._numbers[self._started] = number
-        for replaced in in_place_of:
-            self._forget(replaced)
-        self._note(image, time, {self._started: self.results[self._started]})
-        return self._started
+        return self._start(image, time, in_place_of, lambda replaced: self._tracker.initialize(
+            image, box, time, replaced))
+
+    def initialize_at(self, image: npt.NDArray, point: tuple[float, float], time: float,
+                      in_place_of: Collection[int] = ()) -> int:
+        """Start on what is at a point (x, y), whatever its extent; else as `initialize`."""
+        return self._start(image, time, in_place_of, lambda replaced: self._tracker.initialize_at(
+            image, point, time, replaced))
 
     def update(self, image: npt.NDArray, time: float,
                only: Collection[int] | None = None) -> dict[int, TrackResult]:
@@ -102,9 +100,19 @@ class FallbackTracker:
         self._tracker.reset()
         self._numbers, self._found = {}, {}
 
-    def _start(self, image: npt.NDArray, box: BoundingBox, time: float,
-               in_place_of: Collection[int]) -> int:
-        return self._tracker.initialize(image, box, time, self._inwards(in_place_of))
+    def _start(self, image: npt.NDArray, time: float, in_place_of: Collection[int],
+               start: Callable[[Collection[int]], int]) -> int:
+        """Start in place of targets, by what takes their numbers in the present tracker."""
+        number = self._attempt(lambda: start(self._inwards(in_place_of)))
+        if number is None:
+            self._resume()
+            number = start(self._inwards(in_place_of))
+        self._started += 1
+        self._numbers[self._started] = number
+        for replaced in in_place_of:
+            self._forget(replaced)
+        self._note(image, time, {self._started: self.results[self._started]})
+        return self._started
 
     def _step(self, image: npt.NDArray, time: float,
               only: Collection[int] | None) -> dict[int, TrackResult]:

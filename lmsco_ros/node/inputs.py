@@ -17,14 +17,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 import contextlib
 import functools
 import time
 from typing import Any
 
 from builtin_interfaces.msg import Time
-from geometry_msgs.msg import PolygonStamped
+from geometry_msgs.msg import PointStamped, PolygonStamped
 from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.qos import HistoryPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.serialization import deserialize_message
@@ -41,12 +41,13 @@ from lmsco_ros.node.guarded_node import GuardedNode
 from lmsco_ros.node.history import NANOSECONDS
 from lmsco_ros.node.image_sources import (image_sources, other_image_topics, stale_message,
                                           unheard_warning)
-from lmsco_ros.node.outcome import PendingFrame
+from lmsco_ros.node.outcome import PendingFrame, Place
 from lmsco_ros.node.parameters import Settings
 from lmsco_ros.node.received import ReceivedImage, WhileThereIsRoom
 from lmsco_ros.node.worker import TrackerWorker
 from msg_adapters.boxes import (
-    box_from_polygon, box_from_region, detections_available, tracked_from_detections)
+    box_from_polygon, box_from_region, detections_available, point_from_message,
+    tracked_from_detections)
 from msg_adapters.compressed import image_from_compressed
 from msg_adapters.errors import MessageError
 from msg_adapters.image import image_from_message
@@ -99,6 +100,7 @@ class Inputs:
             for kind, topic, callback in (
                     (RegionOfInterest, 'init_box', self._on_region),
                     (PolygonStamped, 'init_box_stamped', self._on_polygon),
+                    (PointStamped, 'init_point', self._on_point),
                     (UInt32, 'select', self._on_select), *self._detector()):
                 made.callback(node.destroy_subscription, node.create_subscription(
                     kind, topic, callback, _BOX_DEPTH))
@@ -174,12 +176,18 @@ class Inputs:
         self._worker.submit(PendingFrame(image, stamp, received, header))
 
     def _on_region(self, region: RegionOfInterest) -> None:
-        self._start(Header(), region, box_from_region, None)
+        self._start(Header(), None, lambda: self._place(box_from_region(region)))
 
     def _on_polygon(self, polygon: PolygonStamped) -> None:
         # Without a stamp there is no certain frame to start on: take the newest.
         stamp = _nanoseconds(polygon.header.stamp) or None
-        self._start(polygon.header, polygon, box_from_polygon, stamp)
+        self._start(polygon.header, stamp, lambda: self._place(box_from_polygon(polygon)))
+
+    def _on_point(self, point: PointStamped) -> None:
+        # Viewers stamp a click with their own clock: then the newest frame is meant.
+        stamp = _nanoseconds(point.header.stamp)
+        self._start(point.header, stamp if stamp and self._worker.keeps(stamp) else None,
+                    lambda: self._crop.inwards_point(point_from_message(point)))
 
     def _detector(self) -> list[tuple[type, str, Callable]]:
         """Return the subscription for a detector, where its messages are installed."""
@@ -191,8 +199,8 @@ class Inputs:
     def _on_detections(self, message: Any) -> None:
         worker, policy = self._worker, self._policy
         try:
-            found = [Candidate(self._crop.inwards(BoundingBox(*each.box)), each.score,
-                               each.class_id) for each in tracked_from_detections(message)]
+            found = [Candidate(self._place(each.box), each.score, each.class_id)
+                     for each in tracked_from_detections(message)]
         except (MessageError, LMSCOError) as error:
             self._refuse(message.header, str(error), start=True)
             return
@@ -213,14 +221,17 @@ class Inputs:
         self._refuse(Header(), f'there is no target {message.data} to select; followed are '
                      f'{known}')
 
-    def _start(self, header: Header, message: RegionOfInterest | PolygonStamped,
-               read: Callable, stamp: int | None) -> None:
+    def _place(self, box: Sequence[float]) -> BoundingBox:
+        """Return a box of the full image as the tracker sees it."""
+        return self._crop.inwards(BoundingBox(*box))
+
+    def _start(self, header: Header, stamp: int | None, read: Callable[[], Place]) -> None:
         try:
-            box = self._crop.inwards(BoundingBox(*read(message)))
+            place = read()
         except (MessageError, LMSCOError) as error:
             self._refuse(header, str(error), start=True)
         else:
-            self._worker.initialize(box, stamp)
+            self._worker.initialize(place, stamp)
 
 
 def _nanoseconds(stamp: Time) -> int:

@@ -29,7 +29,7 @@ import time
 from lmsco_ros.core.types import BoundingBox, TrackResult
 from lmsco_ros.node.history import FrameHistory, NANOSECONDS
 from lmsco_ros.node.mailbox import Mailbox
-from lmsco_ros.node.outcome import PendingFrame
+from lmsco_ros.node.outcome import PendingFrame, Place
 from lmsco_ros.node.work import is_late_step, Item, Orders, Refuse, Request, Start, Step
 
 
@@ -113,16 +113,21 @@ class Intake:
                     and not self._mailbox.holds(_is_start):
                 self._take_up(Request(box, stamp, time.monotonic(), is_wanted))
 
-    def initialize(self, box: BoundingBox, stamp: int | None = None) -> None:
+    def keeps(self, stamp: int) -> bool:
+        """Tell whether there is a frame with that very stamp to start on."""
+        with self._intake:
+            return bool(self._history.since(stamp))
+
+    def initialize(self, place: Place, stamp: int | None = None) -> None:
         """
         Start on a target, in place of another one where there may be no more.
 
         Parameters
         ----------
-        box : BoundingBox
-            The target.
+        place : BoundingBox, or tuple of float
+            The target, or a point on it.
         stamp : int, optional
-            Stamp of the frame that the box was seen in, in nanoseconds. Frames that came
+            Stamp of the frame that it was seen in, in nanoseconds. Frames that came
             since are gone through again, and those that come meanwhile, up to twice as many
             as the history holds; then the newest is next. By default the newest frame is
             taken. A start whose frame is still to come waits for it: without a stamp for the
@@ -130,7 +135,7 @@ class Intake:
 
         """
         with self._intake:
-            self._take_up(Request(box, stamp, time.monotonic()))
+            self._take_up(Request(place, stamp, time.monotonic()))
 
     def reset(self) -> None:
         """

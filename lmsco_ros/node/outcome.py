@@ -26,6 +26,10 @@ import numpy.typing as npt
 from lmsco_ros.core.types import BoundingBox, TrackResult
 
 
+# What a start is on: the box of a target, or a point (x, y) on it.
+Place = BoundingBox | tuple[float, float]
+
+
 class Tracker(Protocol):
     """The part of the tracker of several targets that the node uses."""
 
@@ -40,6 +44,10 @@ class Tracker(Protocol):
 
         Returns its number, never used before.
         """
+
+    def initialize_at(self, image: npt.NDArray, point: tuple[float, float], time: float,
+                      in_place_of: Collection[int] = ()) -> int:
+        """Start on what is at a point (x, y), whatever its extent; else as `initialize`."""
 
     def update(self, image: npt.NDArray, time: float,
                only: Collection[int] | None = None) -> Mapping[int, TrackResult]:

@@ -19,8 +19,8 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
-from lmsco_ros.core.types import BoundingBox, TrackResult
-from lmsco_ros.node.outcome import PendingFrame
+from lmsco_ros.core.types import TrackResult
+from lmsco_ros.node.outcome import PendingFrame, Place
 
 
 @dataclass(frozen=True)
@@ -44,7 +44,7 @@ class Request:
     One of a machine is met only while it is wanted, and is no matter otherwise.
     """
 
-    box: BoundingBox
+    place: Place
     stamp: int | None
     made: float
     is_wanted: Callable[[Mapping[int, TrackResult]], bool] = _always

@@ -214,7 +214,7 @@ class TrackerWorker(Intake):
 
         def start() -> tuple[Mapping[int, TrackResult], StartAnswer | None]:
             results, answer = self._targets.start(
-                image, item.frame.seconds, item.request.box, follow=item.live)
+                image, item.frame.seconds, item.request.place, follow=item.live)
             self._newest_start = (item.request, answer.number) if answer.accepted else None
             return results, answer
 

@@ -14,10 +14,11 @@
 
 """Boxes survive the way through regions, polygons, markers and detections."""
 
+import math
 import sys
 from types import ModuleType, SimpleNamespace
 
-from geometry_msgs.msg import Point32, Polygon, PolygonStamped
+from geometry_msgs.msg import Point, Point32, PointStamped, Polygon, PolygonStamped
 from hypothesis import given, strategies as st
 import numpy as np
 import pytest
@@ -27,7 +28,8 @@ from visualization_msgs.msg import ImageMarker
 
 from msg_adapters.boxes import (
     Box, box_from_polygon, box_from_region, detections_available, detections_from_boxes,
-    instance_from_box, polygon_from_box, region_from_box, Tracked, tracked_from_detections)
+    instance_from_box, point_from_message, polygon_from_box, region_from_box, Tracked,
+    tracked_from_detections)
 from msg_adapters.errors import BoxMessageError
 from msg_adapters.markers import box_from_marker, marker_from_box, marker_removal
 
@@ -54,6 +56,18 @@ def test_region_is_the_part_that_can_be_expressed(box):
     assert abs(region.x_offset + region.width - box.x - box.width) <= 0.5
     assert abs(region.y_offset - max(box.y, 0)) <= 0.5
     assert abs(region.y_offset + region.height - box.y - box.height) <= 0.5
+
+
+@given(st.floats(-1e9, 1e9), st.floats(-1e9, 1e9), st.floats())
+def test_point_is_where_it_was_clicked(x, y, z):
+    assert point_from_message(PointStamped(point=Point(x=x, y=y, z=z))) == (x, y)
+
+
+@pytest.mark.parametrize('wrong', [math.nan, math.inf])
+def test_point_that_is_not_finite_is_refused(wrong):
+    for point in (Point(x=wrong), Point(y=wrong)):
+        with pytest.raises(BoxMessageError, match='not finite; expected .x, y. in pixels'):
+            point_from_message(PointStamped(point=point))
 
 
 def test_empty_region_is_refused():

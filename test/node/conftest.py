@@ -68,6 +68,9 @@ class FakeTracker:
         self.results[self._started] = self._result(box, TrackState.TRACKING)
         return self._started
 
+    def initialize_at(self, image, point, time, in_place_of=()):
+        return self.initialize(image, BoundingBox.from_center(point, (8, 6)), time, in_place_of)
+
     def update(self, image, time, only=None):
         self.calls.append(('update', image.copy()))
         self.times.append(time)

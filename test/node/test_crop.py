@@ -39,6 +39,7 @@ def test_a_pixel_keeps_its_place_in_the_full_image(crop):
     assert crop.full_shape(remaining) == image.shape
     place = BoundingBox(10, 8, 1, 1)
     inside = crop.inwards(place)
+    assert crop.inwards_point(place.center) == inside.center
     assert remaining[int(inside.y), int(inside.x)] == image[8, 10]
     result = TrackResult(inside, 1.0, TrackState.TRACKING, np.zeros((1, 1), np.float32), inside)
     assert crop.outwards(result).box == crop.outwards(result).search_region == place

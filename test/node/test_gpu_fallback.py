@@ -99,6 +99,16 @@ def test_start_beside_others_is_repeated_on_the_processor(bench):
     assert {number: result.box.x for number, result in tracker.results.items()} == {1: 9, 2: 1}
 
 
+def test_start_on_a_point_is_repeated_on_the_processor(bench):
+    tracker, fakes, _ = bench
+    tracker.initialize(image(0), BOX, 1.0)
+    fakes['cuda'].error = OutOfMemory()
+    assert tracker.initialize_at(image(1), (20.0, 9.0), 1.0, in_place_of=(1,)) == 2
+    assert calls(fakes['cpu']) == [('initialize', 0), ('initialize', 1)]
+    assert {number: result.box.center for number, result in tracker.results.items()} == {
+        2: (20.0, 9.0)}
+
+
 def test_times_go_with_the_frames(bench):
     tracker, fakes, _ = bench
     tracker.initialize(image(0), BOX, 5.0)

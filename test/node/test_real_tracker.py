@@ -17,13 +17,15 @@
 
 from types import SimpleNamespace
 
-from geometry_msgs.msg import PolygonInstanceStamped
+from geometry_msgs.msg import Point, PointStamped, PolygonInstanceStamped
+from nav_msgs.msg import Odometry
 import numpy as np
 import pytest
 from sensor_msgs.msg import Image
 
 from lmsco_ros.node.tracker_factory import make_tracker
 from msg_adapters.boxes import box_from_polygon
+from msg_adapters.state import state_from_odometry
 
 SHAPE = (96, 128)
 
@@ -76,6 +78,38 @@ def test_two_targets_are_followed(run):
     for number, (x, y) in {1: (80.5, 60.5), 2: (40.5, 60.5)}.items():
         left, top, width, height = found[number]
         assert (left + width / 2, top + height / 2) == pytest.approx((x, y), abs=2)
+
+
+@pytest.fixture
+def points(run):
+    """Return a node, and a publisher of points to start on."""
+    running = run(tracker_factory=make_tracker)
+    return running, running.graph.publisher(PointStamped, 'init_point')
+
+
+def test_what_is_at_a_point_is_followed_and_its_motion_told(points):
+    running, clicks = points
+    states = running.graph.listen(Odometry, 'lmsco_tracker/state')
+    clicks.publish(PointStamped(point=Point(x=40.5, y=40.5)))
+    running.settle()
+    for number in range(25):
+        image = _image(running.graph, number)
+        assert running.send(image).state == 'tracking'
+    state = state_from_odometry(running.graph.answer(states, image))
+    # By (2, 1) pixels in 33 ms; the blob has no edge, so its center is known to some pixels.
+    assert state.center == pytest.approx((88.5, 64.5), abs=4)
+    assert state.velocity == pytest.approx((2 / 0.033, 1 / 0.033), abs=6)
+    assert np.linalg.eigvalsh(state.covariance).min() > 0
+    assert np.linalg.eigvalsh(state.velocity_covariance).min() > 0
+
+
+def test_point_where_nothing_is_is_refused(points):
+    running, clicks = points
+    clicks.publish(PointStamped(point=Point(x=2000.5, y=40.5)))
+    running.settle()
+    status = running.send(_image(running.graph, 0))
+    assert (status.start, status.state) == ('refused', 'refused')
+    assert 'not in the image of 128 x 96 pixels' in status.message
 
 
 def test_refused_box_is_reported_and_costs_nothing(run):
