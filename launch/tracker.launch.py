@@ -19,11 +19,12 @@ from pathlib import Path
 from launch import LaunchDescription
 from launch.actions import DeclareLaunchArgument, SetEnvironmentVariable
 from launch.conditions import IfCondition
-from launch.substitutions import LaunchConfiguration
+from launch.substitutions import EqualsSubstitution, IfElseSubstitution, LaunchConfiguration
 from launch_ros.actions import Node
 
 # Installed as share/lmsco_ros/launch beside share/lmsco_ros/config.
 CONFIG = Path(__file__).resolve().parent.parent / 'config'
+CAMERAS = CONFIG / 'cameras'
 
 
 def generate_launch_description() -> LaunchDescription:
@@ -34,8 +35,16 @@ def generate_launch_description() -> LaunchDescription:
             description='Parameters of the node; the default lists and explains all of them. What '
                         'of it is not used is warned of at the start'),
         DeclareLaunchArgument(
+            'camera_profile', default_value='none',
+            choices=['none', *sorted(profile.stem for profile in CAMERAS.glob('*.yaml'))],
+            description='What is known of a camera (config/cameras); counts more than what '
+                        'params_file says'),
+        DeclareLaunchArgument(
             'image_topic', default_value='image_raw',
             description='Thermal images to track in (sensor_msgs/Image)'),
+        DeclareLaunchArgument(
+            'camera_info_topic', default_value='camera_info',
+            description='Calibration of the camera (sensor_msgs/CameraInfo); makes bearings'),
         DeclareLaunchArgument(
             'namespace', default_value='',
             description='Namespace of the node and its topics; one for each of several trackers'),
@@ -50,8 +59,13 @@ def generate_launch_description() -> LaunchDescription:
             executable='tracker_node',
             namespace=LaunchConfiguration('namespace'),
             name='lmsco_tracker',
-            parameters=[LaunchConfiguration('params_file')],
-            remappings=[('image_raw', LaunchConfiguration('image_topic'))],
+            # The same file once more changes nothing.
+            parameters=[LaunchConfiguration('params_file'), IfElseSubstitution(
+                EqualsSubstitution(LaunchConfiguration('camera_profile'), 'none'),
+                if_value=LaunchConfiguration('params_file'),
+                else_value=[f'{CAMERAS}/', LaunchConfiguration('camera_profile'), '.yaml'])],
+            remappings=[('image_raw', LaunchConfiguration('image_topic')),
+                        ('camera_info', LaunchConfiguration('camera_info_topic'))],
             output='screen',
         ),
     ])

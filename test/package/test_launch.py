@@ -23,7 +23,8 @@ import pytest
 
 REPOSITORY = Path(__file__).resolve().parents[2]
 LAUNCH_FILE = REPOSITORY / 'launch' / 'tracker.launch.py'
-ARGUMENTS = {'params_file', 'image_topic', 'namespace', 'use_large_image_profile'}
+ARGUMENTS = {'params_file', 'camera_profile', 'image_topic', 'camera_info_topic', 'namespace',
+             'use_large_image_profile'}
 
 
 class Recorded:
@@ -49,7 +50,8 @@ def entities(monkeypatch):
         'launch': ['LaunchDescription'],
         'launch.actions': ['DeclareLaunchArgument', 'SetEnvironmentVariable'],
         'launch.conditions': ['IfCondition'],
-        'launch.substitutions': ['LaunchConfiguration'],
+        'launch.substitutions': [
+            'EqualsSubstitution', 'IfElseSubstitution', 'LaunchConfiguration'],
         'launch_ros': [],
         'launch_ros.actions': ['Node'],
     }
@@ -88,8 +90,24 @@ def test_node_takes_every_argument(entities):
     assert node.named['namespace'].positional == ('namespace',)
     assert node.named['name'] == 'lmsco_tracker'
     assert node.named['parameters'][0].positional == ('params_file',)
-    ((topic, replacement),) = node.named['remappings']
-    assert topic == 'image_raw' and replacement.positional == ('image_topic',)
+    remapped = {topic: value.positional for topic, value in node.named['remappings']}
+    assert remapped == {'image_raw': ('image_topic',), 'camera_info': ('camera_info_topic',)}
+
+
+def test_camera_profile_counts_more_than_the_parameter_file(entities):
+    """It comes behind that, or that itself again where there is none."""
+    (node,) = entities['Node']
+    _, profile = node.named['parameters']
+    (condition,) = profile.positional
+    assert (condition.positional[0].positional, condition.positional[1]) == (
+        ('camera_profile',), 'none')
+    assert profile.named['if_value'].positional == ('params_file',)
+    folder, name, suffix = profile.named['else_value']
+    assert name.positional == ('camera_profile',)
+    declared, = (item.named for item in entities['DeclareLaunchArgument']
+                 if item.positional == ('camera_profile',))
+    assert declared['default_value'] == 'none' and {'lepton', 'boson'} < set(declared['choices'])
+    assert all(Path(folder + choice + suffix).is_file() for choice in declared['choices'][1:])
 
 
 def test_profile_is_set_before_the_node_starts(monkeypatch, entities):
