@@ -16,7 +16,9 @@
 
 import ast
 import importlib.util
+import itertools
 from pathlib import Path
+import time
 
 import cv2
 import numpy as np
@@ -27,7 +29,8 @@ from lmsco_ros.synthetic.scene import render_scene, SceneConfig
 REPOSITORY = Path(__file__).resolve().parents[2]
 EXAMPLES = sorted((REPOSITORY / 'examples').glob('*.py'))
 PAGE = REPOSITORY / 'docs' / 'examples.md'
-LINES = 90
+LINES = 105
+PATIENCE_SECONDS = 60.0
 
 
 def load(name):
@@ -155,6 +158,70 @@ def test_subscriber_tells_what_the_tracker_publishes():
     finally:
         rclpy.shutdown(context=context)
     assert told == ['0.000000000: 30 x 40 at (10.0, 20.0)', 'tracking, score 0.75', 'idle']
+
+
+@pytest.fixture
+def spinning():
+    """Return a context, and a function that spins nodes in it until a condition holds."""
+    rclpy = pytest.importorskip('rclpy', reason='needs ROS 2')
+    context = rclpy.Context()
+    rclpy.init(context=context)
+    executor = rclpy.executors.SingleThreadedExecutor(context=context)
+
+    def spin_until(condition, *nodes):
+        deadline = time.monotonic() + PATIENCE_SECONDS
+        for node in nodes:
+            executor.add_node(node)
+        while not condition():
+            assert time.monotonic() < deadline, 'nothing happened in time'
+            executor.spin_once(timeout_sec=0.02)
+    yield context, spin_until
+    for node in executor.get_nodes():
+        node.destroy_node()
+    executor.shutdown()
+    rclpy.shutdown(context=context)
+
+
+def test_head_is_steered_onto_the_target(spinning):
+    """The loop is closed over the real node: rendered view, bearing, head, next view."""
+    context, spin_until = spinning
+    from geometry_msgs.msg import PoseWithCovarianceStamped
+
+    from lmsco_ros.node.tracker_node import TrackerNode
+    head = load('ros_pan_tilt').PanTiltHead((150.0, 160.0), context=context)
+    tracker, bearings = TrackerNode(context=context), []
+    topic = '/lmsco_tracker/bearing'
+    head.create_subscription(PoseWithCovarianceStamped, topic, bearings.append, 10)
+    spin_until(lambda: head.is_watched() and head.count_publishers(topic) and all(
+        publisher.get_subscription_count() == 2 for publisher in tracker.publishers
+        if publisher.topic_name == topic), head, tracker)
+    off = []
+    for frame in itertools.islice(render_scene(SceneConfig(width=480, height=320)), 90):
+        told = len(bearings)
+        off.append(head.step(frame))
+        spin_until(lambda: len(bearings) > told)
+    assert off[0] > 7 and max(off[45:]) < 1 and np.mean(off[60:]) < 0.5
+
+
+def test_filter_looks_ahead_of_what_it_is_told(spinning):
+    context, _ = spinning
+    from std_msgs.msg import Header
+
+    from msg_adapters.state import odometry_from_state, State
+    told, rng = [], np.random.default_rng(0)
+    node = load('ros_kalman').LookAhead(told.append, context=context)
+    errors = []
+    for number in range(60):
+        time, header = number / 30, Header()
+        header.stamp.nanosec, header.stamp.sec = number % 30 * 33_333_333, number // 30
+        center = (100 + 40 * time + rng.normal(0, 2), 80 - 20 * time + rng.normal(0, 2))
+        node._on_state(odometry_from_state(State(
+            3, center, 4 * np.eye(2), (40.0, -20.0), 9 * np.eye(2)), header))
+        (x, y, _, _), covariance = node.filters[3].ahead(0.2)
+        errors.append((x - 100 - 40 * (time + 0.2), y - 80 + 20 * (time + 0.2)))
+        assert np.linalg.eigvalsh(covariance).min() > 0
+    assert np.std(errors[20:]) < 1.5 and told[-1].startswith('target 3 in 0.2 s: (18')
+    node.destroy_node()
 
 
 @pytest.mark.parametrize('example', EXAMPLES, ids=lambda path: path.stem)
