@@ -17,10 +17,12 @@
 
 from types import SimpleNamespace
 
+import cv2
 from geometry_msgs.msg import Point, PointStamped, PolygonInstanceStamped
 from nav_msgs.msg import Odometry
 import numpy as np
 import pytest
+from scipy.stats import chi2
 from sensor_msgs.msg import Image
 
 from lmsco_ros.node.tracker_factory import make_tracker
@@ -101,6 +103,34 @@ def test_what_is_at_a_point_is_followed_and_its_motion_told(points):
     assert state.velocity == pytest.approx((2 / 0.033, 1 / 0.033), abs=6)
     assert np.linalg.eigvalsh(state.covariance).min() > 0
     assert np.linalg.eigvalsh(state.velocity_covariance).min() > 0
+
+
+def test_state_is_within_its_covariance_seen_and_coasting_for_a_second(run):
+    """A warm ellipse on a line, away from frame 50 to 79; judged by chi square of two numbers."""
+    running = run(tracker_factory=make_tracker)
+    states = running.graph.listen(Odometry, 'lmsco_tracker/state')
+    rng = np.random.default_rng(0)
+    ground = 8000 + 600 * cv2.GaussianBlur(rng.normal(0, 1, (240, 320)), (0, 0), 6)
+    rows, columns = np.mgrid[:240, :320] + 0.5
+    running.start(51, 46, 18, 28)
+    spreads, far = {'tracking': [], 'uncertain': [], 'lost': []}, []
+    for number in range(95):
+        truth = np.array([60 + 2.0 * number, 60 + 1.0 * number])
+        scene = ground.copy()
+        if not 50 <= number < 80:
+            scene[((columns - truth[0]) / 9)**2 + ((rows - truth[1]) / 14)**2 < 1] = 9000
+        scene = cv2.GaussianBlur(scene, (0, 0), 1) + rng.normal(0, 5, scene.shape)
+        image = running.graph.image(shape=scene.shape)
+        np.frombuffer(image.data, np.uint16).reshape(scene.shape)[:] = scene
+        said = running.send(image).state
+        state = state_from_odometry(running.graph.answer(states, image))
+        error = np.subtract(state.center, truth)
+        far.append(error @ np.linalg.solve(state.covariance, error))
+        spreads[said].append(np.trace(state.covariance))
+    assert max(far) < chi2.ppf(0.99, 2)
+    assert len(spreads['lost']) > 20 and (np.diff(spreads['lost']) > 0).all()
+    # A side of the target at most after a second, and much less while it is seen.
+    assert max(spreads['tracking'][1:]) < 0.05 * max(spreads['lost']) < 28**2
 
 
 def test_point_where_nothing_is_is_refused(points):
