@@ -17,6 +17,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 from lmsco_ros.core.backend import Backend
 from lmsco_ros.core.config import TrackerConfig
@@ -116,6 +117,8 @@ class Track:
         condition = self._gain.examine(frame)
         if condition.shutter_closed:
             self._after_shutter = True
+            height, width = frame.image.shape[:2]
+            self.result = self._with_motion(self.result, (width, height))
             return self.result
         self._frame += 1
         if condition.cut:
@@ -193,11 +196,14 @@ class Track:
     def _describe(self, view: FrameView, detection: Detection, score: float,
                   state: TrackState) -> TrackResult:
         """Return what there is to say; the target in the first frame scores 1 in the map."""
-        x, y = self._motion.velocity
-        return TrackResult(
+        return self._with_motion(TrackResult(
             visible_part(self._box, view.size), score, state,
-            centered_map(detection.peak.grid / self._first_peak), detection.region,
-            velocity=(self._clock.rate * x, self._clock.rate * y),
-            covariance=self._motion.covariance,
-            predicted_box=visible_part(clamp_box(self._motion.box, view.size), view.size),
-            velocity_covariance=self._clock.rate**2 * self._motion.velocity_covariance)
+            centered_map(detection.peak.grid / self._first_peak), detection.region), view.size)
+
+    def _with_motion(self, result: TrackResult, size: tuple[int, int]) -> TrackResult:
+        """Return a result with what is known of the motion, in an image of a size (w, h)."""
+        (x, y), rate = self._motion.velocity, self._clock.rate
+        return replace(
+            result, velocity=(rate * x, rate * y), covariance=self._motion.covariance,
+            predicted_box=visible_part(clamp_box(self._motion.box, size), size),
+            velocity_covariance=rate**2 * self._motion.velocity_covariance)

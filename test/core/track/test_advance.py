@@ -98,7 +98,7 @@ def parts(monkeypatch):
     parts.prediction.expected.return_value, parts.prediction.misses = AHEAD, 0
     parts.extent.side_effect = lambda box, measured: box
     parts.motion.box, parts.motion.velocity = MOVED, (2.0, -1.0)
-    parts.motion.covariance = np.eye(4)
+    parts.motion.covariance, parts.motion.velocity_covariance = np.eye(4), np.eye(2)
     monkeypatch.setattr(track_module, 'box_covariance', lambda *of: of)
     return parts
 
@@ -197,8 +197,15 @@ def test_what_is_not_believable_is_searched_elsewhere_and_that_is_judged(parts, 
 def test_closed_shutter_shows_nothing_new(parts, track):
     before = track.result
     parts.gain.examine.return_value = SHUT
-    for _ in range(3):
-        assert advance(track, frame()) is before
+    for number in range(3):
+        parts.motion.box = MOVED.moved_to((50 + number, 40))
+        parts.motion.covariance = number * np.eye(4)
+        shut = advance(track, frame())
+        assert (shut.box, shut.score, shut.state) == (before.box, before.score, before.state)
+        assert shut.confidence_map is before.confidence_map
+        # The motion goes on behind it, and is known less and less.
+        assert shut.predicted_box == parts.motion.box
+        assert shut.covariance is parts.motion.covariance and track.result is shut
     assert set(names(parts)) == {'motion.predict', 'gain.examine'}
 
 
@@ -266,10 +273,12 @@ def test_motion_goes_by_the_times_of_the_frames(parts):
     assert [made.args[0] for made in parts.motion.predict.call_args_list] == pytest.approx(
         [3.0, 6.0, 3.0])
     assert results[-1].velocity == (60.0, -30.0)
+    np.testing.assert_allclose(results[-1].velocity_covariance, 900 * np.eye(2))
 
 
 def test_frames_without_times_are_one_step_each(parts, track):
-    assert advance(track, frame()).velocity == (2.0, -1.0)
+    result = advance(track, frame())
+    assert result.velocity == (2.0, -1.0) and (result.velocity_covariance == np.eye(2)).all()
     parts.motion.predict.assert_called_once_with(1.0)
 
 
