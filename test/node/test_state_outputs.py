@@ -52,6 +52,8 @@ class Steering:
         assert self.running.send(image).state == state
         self.graph.spin_until(lambda: len(self.of(self.states, image))
                               == len(self.running.fake.results))
+        # What was said besides has been handed out by then, if there was anything.
+        self.running.settle()
         return image
 
     def of(self, messages, image):
@@ -183,6 +185,5 @@ def test_tracker_that_tells_no_motion_has_no_state(steering):
     fake._result = lambda box, state: replace(made(box, state), covariance=None)
     states = len(steering.states)
     assert steering.running.send().state == 'tracking'
-    # What was said of the frame before has arrived by now, if anything was.
-    steering.running.send()
+    steering.running.settle()
     assert len(steering.states) == states
