@@ -15,7 +15,8 @@
 """
 Steer a simulated pan-tilt head onto the target, by the bearing that the tracker node publishes.
 
-    ros2 launch lmsco_ros tracker.launch.py    # elsewhere; or: tracker_node
+    ros2 launch examples/launch/pan_tilt.launch.py    # both at once; or one by one:
+    ros2 run lmsco_ros tracker_node                   # elsewhere
     python examples/ros_pan_tilt.py
 
 Needs ROS 2 Jazzy, this package, and a tracker node. The head looks at a part of a rendered scene

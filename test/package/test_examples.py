@@ -29,7 +29,7 @@ from lmsco_ros.synthetic.scene import render_scene, SceneConfig
 REPOSITORY = Path(__file__).resolve().parents[2]
 EXAMPLES = sorted((REPOSITORY / 'examples').glob('*.py'))
 PAGE = REPOSITORY / 'docs' / 'examples.md'
-LINES = 105
+LINES = 106
 PATIENCE_SECONDS = 60.0
 
 

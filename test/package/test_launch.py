@@ -23,6 +23,7 @@ import pytest
 
 REPOSITORY = Path(__file__).resolve().parents[2]
 LAUNCH_FILE = REPOSITORY / 'launch' / 'tracker.launch.py'
+PAN_TILT_FILE = REPOSITORY / 'examples' / 'launch' / 'pan_tilt.launch.py'
 ARGUMENTS = {'params_file', 'camera_profile', 'image_topic', 'camera_info_topic', 'namespace',
              'use_large_image_profile'}
 
@@ -35,9 +36,9 @@ class Recorded:
         self.named = named
 
 
-def load():
-    """Import the launch file and return its description."""
-    spec = importlib.util.spec_from_file_location('tracker_launch', LAUNCH_FILE)
+def load(file=LAUNCH_FILE):
+    """Import a launch file and return its description."""
+    spec = importlib.util.spec_from_file_location('launch_file', file)
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
     return module.generate_launch_description()
@@ -121,3 +122,18 @@ def test_real_launch_accepts_the_description():
     pytest.importorskip('launch_ros', reason='launch comes with an installed ROS 2')
     description = load()
     assert {argument.name for argument in description.get_launch_arguments()} == ARGUMENTS
+
+
+def test_head_is_started_beside_the_tracker(entities, monkeypatch):
+    """The example is run by this Python, and the tracker comes from its own launch file."""
+    actions, sources = sys.modules['launch.actions'], ModuleType('launch.sources')
+    for module, names in ((actions, ('ExecuteProcess', 'IncludeLaunchDescription')),
+                          (sources, ('PythonLaunchDescriptionSource',))):
+        for name in names:
+            setattr(module, name, type(name, (Recorded,), {}))
+    monkeypatch.setitem(sys.modules, 'launch.launch_description_sources', sources)
+    included, head = load(PAN_TILT_FILE).positional[0]
+    assert included.positional[0].positional == (str(LAUNCH_FILE),)
+    python, program = head.named['cmd']
+    assert python == sys.executable and Path(program).name == 'ros_pan_tilt.py'
+    assert Path(program).is_file()
