@@ -127,8 +127,12 @@ class Chronicle:
         """Take a sample of a frame, and the thumbnails that events wait for."""
         with self._lock:
             self._sample(moment)
-            for track_id, box in moment.boxes.items():
-                self._seen[track_id] = (moment, box)
+            for status in moment.statuses:
+                # While it is uncertain, the box may have left the target already.
+                box = moment.boxes.get(status.track_id)
+                if box is not None and (
+                        status.state == 'tracking' or status.track_id not in self._seen):
+                    self._seen[status.track_id] = (moment, box)
             for place, event in enumerate(self._events):
                 if not event.thumbnail and event.kind in ('accepted', _FOUND) \
                         and event.track_id in moment.boxes:

@@ -173,7 +173,7 @@ class Connection:
     async def _step(self, step: Step) -> None:
         moment = self._desk.feed.beside(step.number, step.by)
         if moment is not None:
-            await self._show(moment)
+            await self._show(moment, 'step')
 
     async def _send_frames(self) -> None:
         """Send what is asked for, as soon as it is there."""
@@ -204,13 +204,14 @@ class Connection:
             except asyncio.TimeoutError:
                 return None
 
-    async def _show(self, moment: Moment) -> None:
+    async def _show(self, moment: Moment, asked: str = 'next') -> None:
         try:
             picture = await asyncio.to_thread(self._desk.pictures.jpeg, moment, self._look)
         except LMSCOError as error:
             await self._send(replies.answer(False, str(error)))
             return
-        content = replies.frame(moment, picture, self._desk, self._events(), self._delay)
+        content = replies.frame(
+            moment, picture, self._desk, self._events(), self._delay, asked)
         self._last = moment
         await self._send(content)
 

@@ -232,7 +232,7 @@ class ConsoleNode(Node):
 
     def _call(self, client: Any, request: Any, answer: Answer) -> None:
         if not client.service_is_ready():
-            answer(False, f'nobody offers {client.service_name}; is the tracker running, and is its '
+            answer(False, f'nobody offers {client.service_name}; is the tracker running under the '
                    f'name {self.settings.tracker}?')
             return
 

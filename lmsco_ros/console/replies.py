@@ -52,7 +52,7 @@ def silence(desk: Desk, events: Iterable[Event]) -> str:
 
 
 def frame(moment: Moment, picture: bytes, desk: Desk, events: Iterable[Event],
-          delay: float | None) -> bytes:
+          delay: float | None, asked: str = 'next') -> bytes:
     """
     Return a frame: the length of the state (4 bytes, big-endian), the state, the picture.
 
@@ -68,12 +68,14 @@ def frame(moment: Moment, picture: bytes, desk: Desk, events: Iterable[Event],
         That the page does not know yet.
     delay : float or None
         Seconds from the arrival of the last frame until it was on the screen.
+    asked : str
+        The kind of request that it answers.
 
     """
     height, width = moment.image.shape[:2]
     selected = moment.statuses[0] if moment.statuses else None
     state = _text({
-        'type': 'frame', 'number': moment.number, 'stamp': str(moment.stamp),
+        'type': 'frame', 'asked': asked, 'number': moment.number, 'stamp': str(moment.stamp),
         'width': width, 'height': height,
         'selected': selected.track_id if selected is not None else 0,
         'state': selected.state if selected is not None else '',

@@ -227,3 +227,13 @@ def test_pictures_of_any_image(moment, image):
     look = Look('ironbow', True)
     shown = replace(moment(1), image=image, confidence=np.ones(image.shape[:2], np.float32))
     assert Pictures().jpeg(shown, look)[:2] == b'\xff\xd8'
+
+
+def test_thumbnail_is_of_a_frame_in_which_the_target_was_certain(clock, status, moment):
+    drawn = []
+    chronicle = Chronicle(lambda moment, box: drawn.append(moment.number) or b'', clock)
+    for number, state in enumerate(('tracking', 'tracking', 'uncertain'), 1):
+        chronicle.hear([status(state)])
+        chronicle.see(moment(number, state))
+    chronicle.hear([status('lost')])
+    assert drawn == [2]

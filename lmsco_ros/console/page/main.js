@@ -7,6 +7,7 @@ import { Strip } from './strip.js';
 import { beep } from './sound.js';
 import { show } from './readings.js';
 
+const SAY_MS = 5000;
 const element = name => document.getElementById(name);
 const page = { paused: false, enabled: true, readOnly: false, state: null, wasLost: false, stepping: false };
 
@@ -26,6 +27,8 @@ function command(message) {
 }
 
 function say(text, refused = false) {
+  clearTimeout(page.saying);
+  if (!refused) page.saying = setTimeout(say, SAY_MS, '');
   element('answer').textContent = text;
   element('answer').classList.toggle('refused', refused);
 }
@@ -47,19 +50,25 @@ function ask() {
 }
 
 async function takeFrame(state, picture) {
+  history.add(state.events);
   try {
     const image = await createImageBitmap(picture);
-    page.state = state;
-    stage.show(image, state);
-    element('empty').hidden = true;
-    strip.add(state);
-    history.add(state.events);
-    tell(state);
+    // A view that stands still moves by steps alone.
+    if (state.asked === 'step' || !page.paused) present(image, state);
+    else image.close();
   } finally {
-    page.stepping = false;
+    if (state.asked === 'step') page.stepping = false;
     // The frame after this one is asked for when this one has been painted.
-    if (!page.paused) requestAnimationFrame(ask);
+    else if (!page.paused) requestAnimationFrame(ask);
   }
+}
+
+function present(image, state) {
+  page.state = state;
+  stage.show(image, state);
+  element('empty').hidden = true;
+  strip.add(state);
+  tell(state);
 }
 
 function takeMessage(message) {
@@ -96,7 +105,7 @@ function tell(state) {
   element('enable').setAttribute('aria-pressed', String(!page.enabled));
   for (const event of state.events) {
     if (event.kind === 'refused') say(event.text, true);
-    if (event.kind === 'accepted') say(event.text);
+    if (event.kind === 'accepted') say(`target ${event.track_id} is followed`);
   }
   const lost = state.targets.filter(each => each.state === 'lost').map(each => each.id);
   const silence = state.health.tracker_silence;
