@@ -25,6 +25,7 @@ import shutil
 import threading
 import time
 
+import cv2
 import numpy as np
 import pytest
 
@@ -64,16 +65,11 @@ def frames():
     return list(render_scene(PLOT))
 
 
-def without_target(frame):
-    """Return a frame in which the ground goes on where the target is."""
-    image = frame.image.astype(np.float64)
-    box = frame.box
-    left, right = max(int(box.x) - 6, 1), min(int(box.x + box.width) + 6, PLOT.width - 2)
-    top, bottom = max(int(box.y) - 6, 0), min(int(box.y + box.height) + 6, PLOT.height)
-    weight = np.linspace(0, 1, right - left)
-    image[top:bottom, left:right] = (image[top:bottom, left - 1:left] * (1 - weight)
-                                     + image[top:bottom, right:right + 1] * weight)
-    return image.astype(np.uint16)
+def without_anybody(frame):
+    """Return a frame in which nothing has an outline any more."""
+    blurred = cv2.GaussianBlur(frame.image.astype(np.float32), (0, 0), 25)
+    return (blurred + np.random.default_rng(0).normal(0, PLOT.noise, blurred.shape)
+            ).astype(np.uint16)
 
 
 class Site:
@@ -81,7 +77,7 @@ class Site:
 
     def __init__(self, frames):
         self._frames = [(message_from_image(frame.image), message_from_image(
-            without_target(frame)), frame.box) for frame in frames[:ALONE]]
+            without_anybody(frame)), frame.box) for frame in frames[:ALONE]]
         self.truth, self.hidden, self._place = {}, False, 0
         self.context = Context()
         self.context.init()

@@ -23,6 +23,7 @@ import pytest
 
 REPOSITORY = Path(__file__).resolve().parents[2]
 LAUNCH_FILE = REPOSITORY / 'launch' / 'tracker.launch.py'
+CONSOLE_FILE = REPOSITORY / 'launch' / 'console.launch.py'
 ARGUMENTS = {'params_file', 'image_topic', 'namespace', 'use_large_image_profile'}
 
 
@@ -34,9 +35,9 @@ class Recorded:
         self.named = named
 
 
-def load():
-    """Import the launch file and return its description."""
-    spec = importlib.util.spec_from_file_location('tracker_launch', LAUNCH_FILE)
+def load(file=LAUNCH_FILE):
+    """Import a launch file and return its description."""
+    spec = importlib.util.spec_from_file_location('launch_file', file)
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
     return module.generate_launch_description()
@@ -103,3 +104,24 @@ def test_real_launch_accepts_the_description():
     pytest.importorskip('launch_ros', reason='launch comes with an installed ROS 2')
     description = load()
     assert {argument.name for argument in description.get_launch_arguments()} == ARGUMENTS
+
+
+def test_console_is_started_beside_the_tracker(entities, monkeypatch):
+    """Its arguments reach its node, and the tracker comes from its own launch file."""
+    actions, sources = sys.modules['launch.actions'], ModuleType('launch.sources')
+    actions.IncludeLaunchDescription = type('IncludeLaunchDescription', (Recorded,), {})
+    sources.PythonLaunchDescriptionSource = type(
+        'PythonLaunchDescriptionSource', (Recorded,), {})
+    monkeypatch.setitem(sys.modules, 'launch.launch_description_sources', sources)
+    found = load(CONSOLE_FILE).positional[0]
+    declared = {item.positional[0]: item.named for item in found
+                if type(item).__name__ == 'DeclareLaunchArgument'}
+    assert set(declared) == {'image_topic', 'namespace', 'host', 'port', 'read_only'}
+    assert all(item['description'] for item in declared.values())
+    *_, included, node = found
+    assert included.positional[0].positional == (str(LAUNCH_FILE),)
+    assert (node.named['package'], node.named['executable']) == ('lmsco_ros', 'console')
+    handed = {name: value.positional[0] for name, value in node.named['parameters'][0].items()}
+    assert handed == {name: name for name in ('host', 'port', 'read_only')}
+    ((topic, replacement),) = node.named['remappings']
+    assert topic == 'image_raw' and replacement.positional == ('image_topic',)
