@@ -26,10 +26,10 @@ from lmsco_ros.console.desk import Desk, Operator
 from lmsco_ros.console.moments import Moment
 from lmsco_ros.console.picture import Look
 from lmsco_ros.console.requests import (
-    Command, Enable, Next, parse_request, Point, RequestError, Reset, Select, Start, Step)
+    Absent, Command, Enable, Next, parse_request, Point, RequestError, Reset, Select, Start, Step,
+    Unmark)
 from lmsco_ros.core.errors import LMSCOError
 
-_SILENCE_SECONDS = 1.0
 _ANSWER_SECONDS = 5.0
 # More than a person gives, and less than would hinder the tracker.
 _MOST_COMMANDS, _PER_SECONDS = 20, 1.0
@@ -55,7 +55,7 @@ class Connection:
         self._socket = socket
         self._desk = desk
         self._loop = asyncio.get_running_loop()
-        self._news = asyncio.Event()
+        self._frames = desk.open_frames()
         self._wanted = asyncio.Event()
         self._sending = asyncio.Lock()
         self._look = Look()
@@ -66,7 +66,6 @@ class Connection:
 
     async def talk(self) -> None:
         """Serve the page until it leaves."""
-        unwatch = self._desk.feed.watch(self._wake)
         frames = asyncio.create_task(self._send_frames())
         try:
             await self._send(replies.greeting(self._desk))
@@ -75,18 +74,10 @@ class Connection:
         except WebSocketDisconnect:
             pass
         finally:
-            unwatch()
+            self._frames.close()
             self._desk.operator.want_map(self, False)
             frames.cancel()
             await asyncio.gather(frames, return_exceptions=True)
-
-    def _wake(self) -> None:
-        """Be told, in another thread, that there is a new frame."""
-        try:
-            self._loop.call_soon_threadsafe(self._news.set)
-        except RuntimeError:
-            # The server has ended in the meantime.
-            pass
 
     async def _receive(self) -> str:
         message = await self._socket.receive()
@@ -146,8 +137,16 @@ class Connection:
             operator.point(command.stamp, command.x, command.y)
         elif isinstance(command, Select):
             operator.select(command.track_id)
+        elif isinstance(command, (Absent, Unmark)):
+            self._mark(command)
         else:
             await self._call(operator, command)
+
+    def _mark(self, command: Absent | Unmark) -> None:
+        marker = self._desk.marker
+        if marker is None:
+            raise RequestError('only the frames of a recording can be marked')
+        (marker.mark_absent if isinstance(command, Absent) else marker.unmark)(command.stamp)
 
     async def _call(self, operator: Operator, command: Reset | Enable) -> None:
         """Have a service do something, and tell its answer."""
@@ -171,7 +170,7 @@ class Connection:
         await self._send(replies.answer(done, text))
 
     async def _step(self, step: Step) -> None:
-        moment = self._desk.feed.beside(step.number, step.by)
+        moment = await self._frames.beside(step.number, step.by)
         if moment is not None:
             await self._show(moment, 'step')
 
@@ -181,7 +180,8 @@ class Connection:
             while True:
                 await self._wanted.wait()
                 self._wanted.clear()
-                moment = await self._newer()
+                moment = await self._frames.after(
+                    0 if self._last is None else self._last.number)
                 if moment is None:
                     await self._send(replies.silence(self._desk, self._events()))
                 else:
@@ -189,20 +189,6 @@ class Connection:
         except WebSocketDisconnect:
             # Whoever receives is told, too, and cleans up.
             pass
-
-    async def _newer(self) -> Moment | None:
-        """Wait for a frame that the page has not seen; None when none comes."""
-        number = 0 if self._last is None else self._last.number
-        deadline = self._loop.time() + _SILENCE_SECONDS
-        while True:
-            self._news.clear()
-            moment = self._desk.feed.after(number)
-            if moment is not None:
-                return moment
-            try:
-                await asyncio.wait_for(self._news.wait(), deadline - self._loop.time())
-            except asyncio.TimeoutError:
-                return None
 
     async def _show(self, moment: Moment, asked: str = 'next') -> None:
         try:

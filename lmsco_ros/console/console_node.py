@@ -17,7 +17,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 import functools
 import threading
 from typing import Any
@@ -37,8 +36,10 @@ from std_srvs.srv import SetBool, Trigger
 from lmsco_ros.console.chronicle import Chronicle
 from lmsco_ros.console.desk import Answer, Desk
 from lmsco_ros.console.feed import Feed, Rate
+from lmsco_ros.console.frames import LiveFrames
 from lmsco_ros.console.moments import Assembly, Moment
 from lmsco_ros.console.picture import Pictures
+from lmsco_ros.console.settings import ConsoleSettings
 from msg_adapters.boxes import box_from_polygon, polygon_from_box
 from msg_adapters.compressed import image_from_compressed
 from msg_adapters.errors import MessageError
@@ -48,37 +49,6 @@ from msg_adapters.status import statuses_from_message
 _DEPTH = 10
 _TICK_SECONDS = 0.1
 _NANOSECONDS = 10 ** 9
-
-
-@dataclass(frozen=True)
-class ConsoleSettings:
-    """
-    Parameters of the console; all are read once.
-
-    Attributes
-    ----------
-    tracker : str
-        Name of the node of the tracker.
-    image_transport : str
-        raw or compressed, as the tracker's.
-    host, port : str, int
-        Where the page is offered; port 0 takes any that is free.
-    read_only : bool
-        Whether pages may only look.
-    allowed_origins : str
-        Of pages behind a reverse proxy, separated by commas.
-    history_megabytes : float
-        Of images that are kept for stepping back.
-
-    """
-
-    tracker: str = 'lmsco_tracker'
-    image_transport: str = 'raw'
-    host: str = '127.0.0.1'
-    port: int = 8080
-    read_only: bool = False
-    allowed_origins: str = ''
-    history_megabytes: float = 64.0
 
 
 class ConsoleNode(Node):
@@ -114,8 +84,9 @@ class ConsoleNode(Node):
         self._maps: Subscription | None = None
         pictures = Pictures()
         topic = self._subscribe_images()
+        self._feed = Feed(self.settings.history_megabytes)
         self.desk = Desk(
-            Feed(self.settings.history_megabytes), Chronicle(pictures.thumbnail), pictures, self,
+            lambda: LiveFrames(self._feed), Chronicle(pictures.thumbnail), pictures, self,
             Rate(), Rate(), topic, self.settings.read_only)
         self._assembly = Assembly(self._deliver)
         self._listen()
@@ -216,7 +187,7 @@ class ConsoleNode(Node):
 
     def _deliver(self, moment: Moment) -> None:
         self.desk.chronicle.see(moment)
-        self.desk.feed.add(moment)
+        self._feed.add(moment)
 
     def _tick(self) -> None:
         with self._lock:

@@ -21,7 +21,8 @@ from dataclasses import dataclass
 from typing import Protocol
 
 from lmsco_ros.console.chronicle import Chronicle
-from lmsco_ros.console.feed import Feed, Rate
+from lmsco_ros.console.feed import Rate
+from lmsco_ros.console.frames import Frames
 from lmsco_ros.console.picture import Pictures
 
 Answer = Callable[[bool, str], object]
@@ -50,6 +51,16 @@ class Operator(Protocol):
         """Have confidence maps as long as somebody wants them."""
 
 
+class Marker(Operator, Protocol):
+    """What a person can have done with a recording besides."""
+
+    def mark_absent(self, stamp: int) -> None:
+        """Mark the frame with a stamp as one without the target."""
+
+    def unmark(self, stamp: int) -> None:
+        """Take the mark of the frame with a stamp away."""
+
+
 @dataclass(frozen=True)
 class Desk:
     """
@@ -57,20 +68,25 @@ class Desk:
 
     Attributes
     ----------
-    feed : Feed
+    open_frames : callable
+        Returns the frames for one page; called in its event loop.
     chronicle : Chronicle
     pictures : Pictures
     operator : Operator
     images, answers : Rate
         How often images, and statuses of the tracker, come in.
     image_topic : str
-        Full name of the topic of the images.
+        Full name of the topic of the images, or the name of the recording.
     read_only : bool
         Whether pages may only look.
+    marker : Marker or None
+        The operator, where it has a recording to mark in place of a tracker.
+    length : int
+        Frames of the recording.
 
     """
 
-    feed: Feed
+    open_frames: Callable[[], Frames]
     chronicle: Chronicle
     pictures: Pictures
     operator: Operator
@@ -78,3 +94,5 @@ class Desk:
     answers: Rate
     image_topic: str
     read_only: bool = False
+    marker: Marker | None = None
+    length: int = 0

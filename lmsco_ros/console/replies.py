@@ -30,12 +30,15 @@ from lmsco_ros.console.picture import PALETTES
 from msg_adapters.status import FrameStatus, Reading
 
 _SHOWN_MESSAGE = 400
+# Of what else is told of a frame, as a start that is refused, the number is another target's.
+_WITH_TARGET = ('tracking', 'uncertain', 'lost', 'marked', 'interpolated')
 
 
 def greeting(desk: Desk) -> str:
     """Return what a page is told first: what it may do, and what happened before."""
     return _text({
-        'type': 'hello', 'read_only': desk.read_only, 'topic': desk.image_topic,
+        'type': 'hello', 'is_recording': desk.marker is not None, 'length': desk.length,
+        'read_only': desk.read_only, 'topic': desk.image_topic,
         'palettes': list(PALETTES),
         'strip': [asdict(sample) for sample in desk.chronicle.strip()]})
 
@@ -81,7 +84,7 @@ def frame(moment: Moment, picture: bytes, desk: Desk, events: Iterable[Event],
         'state': selected.state if selected is not None else '',
         'message': selected.message[:_SHOWN_MESSAGE] if selected is not None else '',
         'targets': [_target(status, moment) for status in moment.statuses if status.track_id
-                    and status.state in ('tracking', 'uncertain', 'lost')],
+                    and status.state in _WITH_TARGET],
         'health': {
             'image_rate': desk.images.per_second, 'answer_rate': desk.answers.per_second,
             'tracker_silence': desk.answers.silence,

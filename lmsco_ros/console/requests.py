@@ -84,7 +84,21 @@ class Enable:
     on: bool
 
 
-Command = Start | Point | Select | Reset | Enable
+@dataclass(frozen=True)
+class Absent:
+    """Mark the frame with a stamp of a recording as one without the target."""
+
+    stamp: int
+
+
+@dataclass(frozen=True)
+class Unmark:
+    """Take the mark of the frame with a stamp of a recording away."""
+
+    stamp: int
+
+
+Command = Start | Point | Select | Reset | Enable | Absent | Unmark
 Request = Command | Next | Step | Look
 
 
@@ -178,5 +192,7 @@ _READERS: dict[str, Callable[[Mapping[str, Any]], Request]] = {
     'point': _point,
     'select': lambda fields: Select(_whole(fields, 'id', 0, 2 ** 32 - 1)),
     'reset': lambda fields: Reset(),
+    'absent': lambda fields: Absent(_stamp(fields)),
+    'unmark': lambda fields: Unmark(_stamp(fields)),
     'enable': lambda fields: Enable(_flag(fields, 'on')),
 }

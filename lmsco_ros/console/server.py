@@ -24,9 +24,9 @@ import threading
 import uvicorn
 
 from lmsco_ros.console.access import Access, AccessError
-from lmsco_ros.console.console_node import ConsoleSettings
 from lmsco_ros.console.desk import Desk
 from lmsco_ros.console.requests import MOST_BYTES
+from lmsco_ros.console.settings import ConsoleSettings
 from lmsco_ros.console.web import make_app
 from lmsco_ros.node.ros_arguments import StartError
 

@@ -23,6 +23,7 @@ import pytest
 from lmsco_ros.console.chronicle import Chronicle
 from lmsco_ros.console.desk import Desk
 from lmsco_ros.console.feed import Feed, Rate
+from lmsco_ros.console.frames import LiveFrames
 from lmsco_ros.console.moments import Moment
 from lmsco_ros.console.picture import Pictures
 from msg_adapters.boxes import Box
@@ -76,12 +77,18 @@ def moment(status):
 
 
 @pytest.fixture
-def make_desk():
+def feed():
+    """Return what the frames for the pages are added to."""
+    return Feed()
+
+
+@pytest.fixture
+def make_desk(feed):
     """Return a maker of desks without frames."""
     def make(**fields):
         pictures = Pictures()
-        return Desk(Feed(), Chronicle(pictures.thumbnail), pictures, FakeOperator(), Rate(),
-                    Rate(), '/image_raw', **fields)
+        return Desk(lambda: LiveFrames(feed), Chronicle(pictures.thumbnail), pictures,
+                    FakeOperator(), Rate(), Rate(), '/image_raw', **fields)
     return make
 
 

@@ -47,8 +47,9 @@ from selenium.webdriver.common.keys import Keys  # noqa: E402
 from selenium.webdriver.support.ui import WebDriverWait  # noqa: E402
 from sensor_msgs.msg import Image  # noqa: E402
 
-from lmsco_ros.console.console_node import ConsoleNode, ConsoleSettings  # noqa: E402
+from lmsco_ros.console.console_node import ConsoleNode  # noqa: E402
 from lmsco_ros.console.server import serving  # noqa: E402
+from lmsco_ros.console.settings import ConsoleSettings  # noqa: E402
 from lmsco_ros.node.tracker_node import TrackerNode  # noqa: E402
 from lmsco_ros.synthetic import render_scene, SceneConfig  # noqa: E402
 from msg_adapters.image import message_from_image  # noqa: E402

@@ -21,7 +21,7 @@ import yaml
 
 from lmsco_ros.console import connection, requests, web
 from lmsco_ros.console.access import SHORTEST_TOKEN
-from lmsco_ros.console.console_node import ConsoleSettings
+from lmsco_ros.console.settings import ConsoleSettings
 
 REPOSITORY = Path(__file__).resolve().parents[2]
 PAGE = (REPOSITORY / 'docs' / 'console.md').read_text()

@@ -24,8 +24,8 @@ import pytest
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import connect
 
-from lmsco_ros.console.console_node import ConsoleSettings
 from lmsco_ros.console.server import serving
+from lmsco_ros.console.settings import ConsoleSettings
 from lmsco_ros.node.ros_arguments import StartError
 
 PATIENCE = 100.0
@@ -56,8 +56,8 @@ def ask(socket, read_frame):
             return read_frame(data)[0]['number']
 
 
-def test_page_is_served_with_its_socket(address, desk, moment, read_frame):
-    desk.feed.add(moment(3))
+def test_page_is_served_with_its_socket(address, feed, moment, read_frame):
+    feed.add(moment(3))
     with join(address) as socket:
         assert ask(socket, read_frame) == 3
 
@@ -70,8 +70,8 @@ def test_foreign_origin_is_turned_away(address):
 
 @pytest.mark.parametrize('size', [2049, 5_000_000])
 def test_long_messages_end_the_connection_and_nothing_else(
-        address, desk, moment, read_frame, size):
-    desk.feed.add(moment(1))
+        address, feed, moment, read_frame, size):
+    feed.add(moment(1))
     with join(address) as other:
         with join(address) as socket, pytest.raises(ConnectionClosed):
             socket.send('a' * size)
@@ -80,7 +80,7 @@ def test_long_messages_end_the_connection_and_nothing_else(
         assert ask(other, read_frame) == 1
 
 
-def test_page_that_reads_nothing_harms_nobody(address, desk, moment, read_frame):
+def test_page_that_reads_nothing_harms_nobody(address, feed, moment, read_frame):
     """It asks and asks, and the frames for it fill all that lies between."""
     ended = threading.Event()
 
@@ -89,21 +89,21 @@ def test_page_that_reads_nothing_harms_nobody(address, desk, moment, read_frame)
             while not ended.is_set():
                 stuck.send('{"type": "step", "number": 1, "by": 0}')
 
-    desk.feed.add(moment(1, shape=(480, 640)))
+    feed.add(moment(1, shape=(480, 640)))
     thread = threading.Thread(target=flood, daemon=True)
     thread.start()
     with join(address) as other:
         for number in range(2, 40):
-            desk.feed.add(moment(number))
+            feed.add(moment(number))
             assert ask(other, read_frame) == number
         assert thread.is_alive()
     # It ends with the server.
     ended.set()
 
 
-def test_ten_thousand_messages_leave_nothing_behind(address, desk, moment, read_frame):
+def test_ten_thousand_messages_leave_nothing_behind(address, feed, desk, moment, read_frame):
     rng = np.random.default_rng(3)
-    desk.feed.add(moment(1))
+    feed.add(moment(1))
     texts = ['', '{', 'null', '[]', '{"type": "look"}', '{"type": "start", "box": [1, 2, 3, 4]}',
              '{"type": "select", "id": -1}', '{"type": "step", "number": 1e99, "by": 0}',
              '[' * 1500, '{"type": "next", "drawn": 9007199254740993}', '\u0000', '"' * 2000]

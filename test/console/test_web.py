@@ -22,7 +22,7 @@ import pytest
 from starlette.testclient import TestClient
 from starlette.websockets import WebSocketDisconnect
 
-from lmsco_ros.console import connection
+from lmsco_ros.console import connection, frames
 from lmsco_ros.console.access import Access
 from lmsco_ros.console.web import make_app
 
@@ -46,8 +46,8 @@ def page(client, desk):
         yield socket
 
 
-def test_frame_and_its_state_come_in_one_message(page, desk, moment, read_frame):
-    desk.feed.add(moment(5))
+def test_frame_and_its_state_come_in_one_message(page, feed, moment, read_frame):
+    feed.add(moment(5))
     page.send_json({'type': 'next', 'drawn': 0})
     state, picture = read_frame(page.receive_bytes())
     assert (state['number'], state['stamp']) == (5, '1000000000000000005')
@@ -58,25 +58,25 @@ def test_frame_and_its_state_come_in_one_message(page, desk, moment, read_frame)
     assert cv2.imdecode(np.frombuffer(picture, np.uint8), cv2.IMREAD_UNCHANGED).shape == (48, 64)
 
 
-def test_a_page_that_asks_late_gets_the_newest_frame(page, desk, moment, read_frame):
+def test_a_page_that_asks_late_gets_the_newest_frame(page, feed, moment, read_frame):
     for number in range(1, 30):
-        desk.feed.add(moment(number))
+        feed.add(moment(number))
     page.send_json({'type': 'next', 'drawn': 0})
     assert read_frame(page.receive_bytes())[0]['number'] == 29
-    desk.feed.add(moment(30))
+    feed.add(moment(30))
     page.send_json({'type': 'next', 'drawn': 29})
     state, _ = read_frame(page.receive_bytes())
     assert state['number'] == 30 and state['health']['delay_ms'] > 0
 
 
-def test_a_frame_that_comes_later_is_sent_when_it_comes(page, desk, moment, read_frame):
+def test_a_frame_that_comes_later_is_sent_when_it_comes(page, feed, moment, read_frame):
     page.send_json({'type': 'next', 'drawn': 0})
-    desk.feed.add(moment(1))
+    feed.add(moment(1))
     assert read_frame(page.receive_bytes())[0]['number'] == 1
 
 
 def test_silence_is_told(page, desk, monkeypatch):
-    monkeypatch.setattr(connection, '_SILENCE_SECONDS', 0.01)
+    monkeypatch.setattr(frames, '_SILENCE_SECONDS', 0.01)
     page.send_json({'type': 'next', 'drawn': 0})
     told = page.receive_json()
     assert told['type'] == 'silence' and told['seconds'] is None
@@ -114,18 +114,18 @@ def test_a_tracker_that_does_not_answer_is_told(page, desk, monkeypatch):
     assert 'does not answer' in page.receive_json()['text']
 
 
-def test_pages_step_through_what_is_kept(page, desk, moment, read_frame):
+def test_pages_step_through_what_is_kept(page, feed, moment, read_frame):
     for number in range(1, 6):
-        desk.feed.add(moment(number))
+        feed.add(moment(number))
     for number, by, shown in [(5, -1, 4), (4, -2, 2), (2, -10, 1), (1, 1, 2), (4, 100, 5)]:
         page.send_json({'type': 'step', 'number': number, 'by': by})
         assert read_frame(page.receive_bytes())[0]['number'] == shown
 
 
-def test_palette_and_layer_change_the_picture(page, desk, moment, read_frame):
+def test_palette_and_layer_change_the_picture(page, feed, desk, moment, read_frame):
     confidence = np.zeros((48, 64), np.float32)
     confidence[10:20, 10:30] = 1
-    desk.feed.add(moment(1, confidence=confidence))
+    feed.add(moment(1, confidence=confidence))
 
     def picture(palette, layer):
         page.send_json({'type': 'look', 'palette': palette, 'confidence': layer})
@@ -154,12 +154,12 @@ def test_maps_are_no_longer_wanted_when_the_page_has_left(client, desk):
 
 
 def test_what_happened_is_told_once_and_again_when_it_changed(
-        page, desk, moment, status, read_frame):
+        page, feed, desk, moment, status, read_frame):
     def events(number):
         page.send_json({'type': 'step', 'number': number, 'by': 0})
         return read_frame(page.receive_bytes())[0]['events']
 
-    desk.feed.add(moment(1))
+    feed.add(moment(1))
     desk.chronicle.hear([status(start='accepted')])
     (event,) = events(1)
     assert (event['kind'], event['track_id'], event['thumbnail']) == ('accepted', 1, '')
@@ -169,9 +169,9 @@ def test_what_happened_is_told_once_and_again_when_it_changed(
     assert again['number'] == event['number'] and again['thumbnail']
 
 
-def test_read_only_pages_may_only_look(client, make_desk, moment, read_frame):
+def test_read_only_pages_may_only_look(client, make_desk, feed, moment, read_frame):
     desk = make_desk(read_only=True)
-    desk.feed.add(moment(1))
+    feed.add(moment(1))
     with client(desk).websocket_connect('/socket', headers=OWN) as socket:
         assert socket.receive_json()['read_only'] is True
         for message in ({'type': 'reset'}, {'type': 'select', 'id': 1},
@@ -277,12 +277,12 @@ def test_no_path_leads_anywhere_else(client, desk, path):
     assert 'import' not in client(desk).get(path).text
 
 
-def test_ten_thousand_foul_messages(page, desk, moment, read_frame):
+def test_ten_thousand_foul_messages(page, feed, moment, read_frame):
     rng = np.random.default_rng(7)
     kinds = ['next', 'step', 'look', 'start', 'point', 'select', 'reset', 'enable', 'x', None, 1]
     values = [None, True, -1, 0, 1e400, 'a' * 3000, '', [], {}, [1, 2, 3, 4], [float('nan')] * 4,
               '9' * 19, '12', 2 ** 64, 'white_hot', [[]] * 4]
-    desk.feed.add(moment(1))
+    feed.add(moment(1))
     for number in range(10_000):
         fields = {'type': kinds[rng.integers(len(kinds))]}
         for name in ('stamp', 'box', 'x', 'y', 'id', 'on', 'by', 'number', 'drawn', 'palette'):
@@ -296,7 +296,7 @@ def test_ten_thousand_foul_messages(page, desk, moment, read_frame):
         else:
             page.send_text(text)
     # The next frame can still be had, behind all the answers.
-    desk.feed.add(moment(2))
+    feed.add(moment(2))
     page.send_json({'type': 'step', 'number': 2, 'by': 0})
     numbers = []
     while 2 not in numbers:

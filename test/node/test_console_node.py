@@ -62,7 +62,7 @@ def watched(running, console):
 
 def shown(running, image):
     """Return what the console shows of an image that is sent until it has it."""
-    feed = running.console.desk.feed
+    feed = running.console._feed
     running.send(image)
     stamp = image.header.stamp.sec * 10 ** 9 + image.header.stamp.nanosec
 
@@ -191,8 +191,8 @@ def test_images_are_shown_without_a_tracker(graph, console):
     node = console()
     images = graph.publisher(Image, 'image_raw')
     images.publish(graph.image(5))
-    graph.spin_until(lambda: node.desk.feed.after(0))
-    assert node.desk.feed.after(0).statuses == ()
+    graph.spin_until(lambda: node._feed.after(0))
+    assert node._feed.after(0).statuses == ()
     assert node.desk.images.silence > 0 and node.desk.answers.silence is None
 
 
@@ -202,8 +202,8 @@ def test_compressed_images_are_shown(graph, console):
     images = graph.publisher(type(compressed_from_image(np.zeros((4, 4), np.uint8))),
                              'image_raw/compressed')
     images.publish(compressed_from_image(np.full((48, 64), 900, np.uint16)))
-    graph.spin_until(lambda: node.desk.feed.after(0))
-    assert (node.desk.feed.after(0).image == 900).all()
+    graph.spin_until(lambda: node._feed.after(0))
+    assert (node._feed.after(0).image == 900).all()
 
 
 def test_parameters_of_the_wrong_type_are_refused(console):
