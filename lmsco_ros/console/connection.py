@@ -17,6 +17,7 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import time
 
 from starlette.websockets import WebSocket, WebSocketDisconnect
@@ -111,7 +112,7 @@ class Connection:
             else:
                 self._check(request)
                 await self._do(request)
-        except RequestError as error:
+        except (LMSCOError, RequestError) as error:
             await self._send(replies.answer(False, str(error)))
 
     def _note_drawn(self, number: int) -> None:
@@ -171,35 +172,37 @@ class Connection:
 
     async def _step(self, step: Step) -> None:
         moment = await self._frames.beside(step.number, step.by)
-        if moment is not None:
-            await self._show(moment, 'step')
+        if moment is None:
+            raise RequestError('there is no frame yet')
+        await self._show(moment, 'step')
 
     async def _send_frames(self) -> None:
         """Send what is asked for, as soon as it is there."""
-        try:
+        # Whoever receives is told of the end, too, and cleans up.
+        with contextlib.suppress(WebSocketDisconnect):
             while True:
                 await self._wanted.wait()
                 self._wanted.clear()
-                moment = await self._frames.after(
-                    0 if self._last is None else self._last.number)
-                if moment is None:
+                if not await self._send_next():
                     await self._send(replies.silence(self._desk, self._events()))
-                else:
-                    await self._show(moment)
-        except WebSocketDisconnect:
-            # Whoever receives is told, too, and cleans up.
-            pass
 
-    async def _show(self, moment: Moment, asked: str = 'next') -> None:
+    async def _send_next(self) -> bool:
+        """Send the next frame; tell whether there was one that can be shown."""
         try:
-            picture = await asyncio.to_thread(self._desk.pictures.jpeg, moment, self._look)
-        except LMSCOError as error:
+            moment = await self._frames.after(0 if self._last is None else self._last.number)
+            if moment is not None:
+                await self._show(moment, 'next')
+            return moment is not None
+        except (LMSCOError, RequestError) as error:
             await self._send(replies.answer(False, str(error)))
-            return
-        content = replies.frame(
-            moment, picture, self._desk, self._events(), self._delay, asked)
+            return False
+
+    async def _show(self, moment: Moment, asked: str) -> None:
+        # A frame that cannot be shown is not tried again.
         self._last = moment
-        await self._send(content)
+        picture = await asyncio.to_thread(self._desk.pictures.jpeg, moment, self._look)
+        await self._send(replies.frame(
+            moment, picture, self._desk, self._events(), self._delay, asked))
 
     def _events(self) -> list:
         """Return what the page does not know yet."""

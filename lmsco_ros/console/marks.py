@@ -23,7 +23,6 @@ import numpy as np
 
 from lmsco_ros.evaluation.whole_file import write_whole
 from lmsco_ros.replay.bags.output import BagOutput
-from lmsco_ros.replay.storage import Storage
 from msg_adapters.boxes import Box, corners_of_box
 
 MARKED, INTERPOLATED, ABSENT, UNMARKED = 'marked', 'interpolated', 'absent', 'unmarked'
@@ -86,16 +85,14 @@ class Marks:
         mixed = (1 - share) * np.array(first) + share * np.array(last)
         return INTERPOLATED, Box(*(float(value) for value in mixed))
 
-    def write_bag(self, path: Path, storage: Storage, stamps: Mapping[int, int]) -> int:
+    def write_bag(self, output: BagOutput, stamps: Mapping[int, int]) -> int:
         """
         Write the boxes as polygons on `/box` into a new bag, and return how many there are.
 
         Parameters
         ----------
-        path : Path
-            The bag's folder; it must not exist.
-        storage : Storage
-            File format.
+        output : BagOutput
+            The bag, not opened yet.
         stamps : mapping of int to int
             Stamps of the frames, in nanoseconds; frames without one are left out.
 
@@ -109,7 +106,7 @@ class Marks:
 
         store = get_typestore(Stores.ROS2_JAZZY)
         types = store.types
-        with BagOutput(path, storage) as output:
+        with output:
             connection = output.add_connection(_TOPIC, _POLYGON, typestore=store)
             for index, box in self._boxes():
                 if index not in stamps:

@@ -18,7 +18,7 @@ from __future__ import annotations
 
 import asyncio
 from collections import OrderedDict
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 import threading
 import time
 
@@ -26,6 +26,7 @@ from lmsco_ros.console.desk import Answer
 from lmsco_ros.console.marks import Marks
 from lmsco_ros.console.moments import Moment
 from lmsco_ros.console.requests import RequestError
+from lmsco_ros.replay.errors import ReplayError
 from lmsco_ros.replay.frame import RecordedFrame
 from lmsco_ros.replay.sources import Source
 from msg_adapters.boxes import Box
@@ -105,7 +106,12 @@ class Recording:
 
     def _read(self) -> bool:
         """Read one more frame; tell whether there was one."""
-        frame = next(self._rest, None)
+        try:
+            frame = next(self._rest, None)
+        except ReplayError:
+            # What is read from then on would begin anywhere.
+            self._rest, self._next = iter(self._source), 0
+            raise
         if frame is None:
             self._length = self._next
             return False
@@ -138,8 +144,19 @@ class Annotator:
         self._marks = marks
 
     def moment(self, index: int) -> Moment | None:
-        """Return a frame with what is known of the target in it."""
-        frame = self.recording.at(index)
+        """
+        Return a frame with what is known of the target in it; None when there is none.
+
+        Raises
+        ------
+        RequestError
+            When the recording cannot be read.
+
+        """
+        try:
+            frame = self.recording.at(index)
+        except ReplayError as error:
+            raise RequestError(str(error)) from error
         if frame is None:
             return None
         state, box = self._marks.at(frame.index)
@@ -149,15 +166,15 @@ class Annotator:
 
     def start(self, stamp: int, box: tuple[float, float, float, float]) -> None:
         """Mark the frame with a stamp."""
-        self._marks.set(self.recording.index_of(stamp), Box(*box))
+        self._mark(stamp, lambda index: self._marks.set(index, Box(*box)))
 
     def mark_absent(self, stamp: int) -> None:
         """Mark the frame with a stamp as one without the target."""
-        self._marks.set(self.recording.index_of(stamp), None)
+        self._mark(stamp, lambda index: self._marks.set(index, None))
 
     def unmark(self, stamp: int) -> None:
         """Take the mark of the frame with a stamp away."""
-        self._marks.remove(self.recording.index_of(stamp))
+        self._mark(stamp, self._marks.remove)
 
     def point(self, stamp: int, x: float, y: float) -> None:
         """Refuse: there is no tracker that would find the extent."""
@@ -176,6 +193,14 @@ class Annotator:
 
     def want_map(self, who: object, wanted: bool) -> None:
         """Do nothing: there are no maps."""
+
+    def _mark(self, stamp: int, change: Callable[[int], None]) -> None:
+        """Change what is known of the frame with a stamp."""
+        try:
+            change(self.recording.index_of(stamp))
+        except OSError as error:
+            raise RequestError(f'the mark is not kept, as it cannot be written: {error}'
+                               ) from error
 
 
 class RecordedFrames:

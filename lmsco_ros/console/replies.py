@@ -55,7 +55,7 @@ def silence(desk: Desk, events: Iterable[Event]) -> str:
 
 
 def frame(moment: Moment, picture: bytes, desk: Desk, events: Iterable[Event],
-          delay: float | None, asked: str = 'next') -> bytes:
+          delay: float | None, asked: str) -> bytes:
     """
     Return a frame: the length of the state (4 bytes, big-endian), the state, the picture.
 

@@ -28,12 +28,12 @@ from rclpy.impl.implementation_singleton import rclpy_implementation
 
 from lmsco_ros.console.console_node import ConsoleNode
 from lmsco_ros.console.server import serving
+from lmsco_ros.console.settings import TOKEN_VARIABLE
 from lmsco_ros.node.executor import GuardedExecutor
 from lmsco_ros.node.faults import Faults
 from lmsco_ros.node.ros_arguments import explained, StartError
 from lmsco_ros.node.run import in_ros
 
-TOKEN_VARIABLE = 'LMSCO_CONSOLE_TOKEN'
 # The end of the process is noticed after this time at the latest.
 _LOOK_PERIOD = 0.1
 

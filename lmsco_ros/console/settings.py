@@ -18,6 +18,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+TOKEN_VARIABLE = 'LMSCO_CONSOLE_TOKEN'
+"""Of the environment, not of ROS: everybody on the graph may read parameters."""
+
 
 @dataclass(frozen=True)
 class ConsoleSettings:

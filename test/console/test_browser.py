@@ -47,6 +47,7 @@ from selenium.webdriver.common.keys import Keys  # noqa: E402
 from selenium.webdriver.support.ui import WebDriverWait  # noqa: E402
 from sensor_msgs.msg import Image  # noqa: E402
 
+from lmsco_ros.console.annotate import annotating  # noqa: E402
 from lmsco_ros.console.console_node import ConsoleNode  # noqa: E402
 from lmsco_ros.console.server import serving  # noqa: E402
 from lmsco_ros.console.settings import ConsoleSettings  # noqa: E402
@@ -405,3 +406,35 @@ def test_nothing_is_wider_than_the_window(site, address, size):
             'return document.documentElement.scrollWidth - window.innerWidth')
         assert wide <= 0
         assert not page.complaints()
+
+
+def test_target_is_marked_in_a_recording(frames, browser, tmp_path):
+    (tmp_path / 'frames').mkdir()
+    for frame in frames[:9]:
+        cv2.imwrite(str(tmp_path / 'frames' / f'{frame.index}.png'), frame.image)
+    output = tmp_path / 'marks.txt'
+    with annotating(tmp_path / 'frames', output, ConsoleSettings(port=0)) as (address, *_):
+        page = Page(browser, address)
+        assert page.state['state'] == 'unmarked' and page.text('frame-number') == '1 of 9'
+        page.drag(frames[0].box.as_tuple())
+        page.until(lambda: page.state['state'] == 'marked')
+        for number in range(2, 10):
+            page.key(Keys.ARROW_RIGHT)
+            page.until(lambda: page.state['number'] == number)
+        page.drag(frames[8].box.as_tuple())
+        page.until(lambda: page.state['state'] == 'marked')
+        page.key(Keys.ARROW_LEFT)
+        page.until(lambda: page.state['state'] == 'interpolated')
+        # It plays to its end, and stands still there.
+        page.browser.execute_script("document.getElementById('place').value = 1;"
+                                    "document.getElementById('place').dispatchEvent("
+                                    "new Event('input'));")
+        page.until(lambda: page.state['number'] == 1)
+        page.key(' ')
+        page.until(lambda: page.state['number'] == 9)
+        page.until(lambda: page.text('pause-word') == 'Play')
+        assert not page.complaints()
+        browser.get('about:blank')
+    marked = np.loadtxt(output, delimiter=',')
+    truth = [frame.box.as_tuple() for frame in frames[:9]]
+    assert min(overlap(*pair) for pair in zip(marked, truth)) > 0.6

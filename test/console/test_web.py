@@ -122,6 +122,11 @@ def test_pages_step_through_what_is_kept(page, feed, moment, read_frame):
         assert read_frame(page.receive_bytes())[0]['number'] == shown
 
 
+def test_step_where_nothing_came_yet_is_answered(page):
+    page.send_json({'type': 'step', 'number': 1, 'by': 1})
+    assert 'no frame' in page.receive_json()['text']
+
+
 def test_palette_and_layer_change_the_picture(page, feed, desk, moment, read_frame):
     confidence = np.zeros((48, 64), np.float32)
     confidence[10:20, 10:30] = 1

@@ -215,6 +215,7 @@ def test_state_of_a_real_frame_is_json(watched):
     from lmsco_ros.console import replies
     follow(watched)
     desk = watched.console.desk
-    data = replies.frame(shown(watched, watched.graph.image(5)), b'', desk, [], None)
+    data = replies.frame(shown(watched, watched.graph.image(5)), b'', desk, [], None,
+                         'next')
     state = json.loads(data[4:])
     assert state['targets'][0]['counts'] == {'minimum': 5, 'mean': 5, 'maximum': 5}

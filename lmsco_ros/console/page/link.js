@@ -35,8 +35,8 @@ export class Link {
   receive(data) {
     if (typeof data === 'string') {
       const message = JSON.parse(data);
-      if (message.type === 'hello') this.on.up(true);
       this.on.message(message);
+      if (message.type === 'hello') this.on.up(true);
     } else {
       const { state, picture } = readFrame(data);
       this.on.frame(state, picture);

@@ -9,12 +9,12 @@ import { show } from './readings.js';
 
 const SAY_MS = 5000;
 const element = name => document.getElementById(name);
-const page = { paused: false, enabled: true, readOnly: false, state: null, wasLost: false, stepping: false };
+const page = { paused: false, enabled: true, readOnly: false, recording: false, state: null, wasLost: false, stepping: false };
 
 const strip = new Strip(element('strip'));
 const history = new History(element('history'));
 const stage = new Stage(element('stage'), {
-  drag: (box, seen) => command({ type: 'start', stamp: seen.stamp, box }),
+  drag: (box, seen) => start(box, seen),
   click: (x, y, seen) => command({ type: 'point', stamp: seen.stamp, x, y }),
   pick: id => command({ type: 'select', id }),
 });
@@ -24,6 +24,19 @@ function command(message) {
   if (page.readOnly) return;
   say('');
   link.send(message);
+}
+
+/** Start in the frame that was seen; in a recording, mark it and look at the mark. */
+function start(box, seen) {
+  command({ type: 'start', stamp: seen.stamp, box });
+  step(0);
+}
+
+/** Change what is known of the frame that is shown. */
+function mark(type) {
+  if (!page.state) return;
+  command({ type, stamp: page.state.stamp });
+  step(0);
 }
 
 function say(text, refused = false) {
@@ -37,6 +50,8 @@ function isUp(up) {
   element('link').textContent = up ? 'connected' : 'not connected';
   element('link').dataset.up = up;
   if (up) {
+    page.stepping = false;
+    page.later = null;
     history.clear();
     look();
     if (!page.paused) ask();
@@ -57,13 +72,14 @@ async function takeFrame(state, picture) {
     if (state.asked === 'step' || !page.paused) present(image, state);
     else image.close();
   } finally {
-    if (state.asked === 'step') page.stepping = false;
+    if (state.asked === 'step') stepped();
     // The frame after this one is asked for when this one has been painted.
     else if (!page.paused) requestAnimationFrame(ask);
   }
 }
 
 function present(image, state) {
+  if (page.recording) place(state.number);
   page.state = state;
   stage.show(image, state);
   element('empty').hidden = true;
@@ -74,6 +90,7 @@ function present(image, state) {
 function takeMessage(message) {
   if (message.type === 'hello') {
     page.readOnly = message.read_only;
+    record(message);
     document.body.classList.toggle('looks', message.read_only);
     stage.locked = message.read_only;
     element('read-only').hidden = !message.read_only;
@@ -82,8 +99,15 @@ function takeMessage(message) {
     strip.load(message.strip);
   } else if (message.type === 'answer') {
     say(message.text, !message.done);
+    // A step that cannot be made has no frame that would end it.
+    if (!message.done) stepped();
   } else if (message.type === 'silence') {
     history.add(message.events);
+    if (page.recording) {
+      // It is at its end.
+      if (!page.paused) pause();
+      return;
+    }
     silent(message);
     if (!page.paused) ask();
   }
@@ -97,9 +121,27 @@ function silent({ seconds, topic }) {
   if (!page.state) element('empty').textContent = `Waiting for images on ${topic}`;
 }
 
+/** A recording begins at rest. */
+function record({ is_recording: recorded, length }) {
+  page.recording = recorded;
+  document.body.classList.toggle('records', recorded);
+  if (!recorded) return;
+  element('place').max = length;
+  if (!page.state && !page.paused) pause();
+}
+
+function place(number) {
+  element('place').value = number;
+  element('frame-number').textContent = `${number} of ${element('place').max}`;
+}
+
 /** Show what is said of a frame, and warn of a loss. */
 function tell(state) {
   show(state, id => command({ type: 'select', id }));
+  if (page.recording) {
+    warn('');
+    return;
+  }
   page.enabled = state.state !== 'disabled';
   element('enable').textContent = page.enabled ? 'Stop tracker' : 'Resume tracker';
   element('enable').setAttribute('aria-pressed', String(!page.enabled));
@@ -140,26 +182,44 @@ function look() {
 function pause() {
   page.paused = !page.paused;
   element('pause').setAttribute('aria-pressed', String(page.paused));
-  element('frozen').hidden = !page.paused;
+  element('frozen').hidden = !page.paused || page.recording;
+  element('pause-word').textContent = page.recording && page.paused ? 'Play'
+    : page.recording ? 'Pause' : 'Pause view';
   element('back').disabled = element('forward').disabled = !page.paused;
   if (!page.paused) ask();
 }
 
 function step(by) {
-  if (!page.paused || !page.state || page.stepping) return;
+  seek(page.state ? page.state.number : 1, by);
+}
+
+function seek(number, by) {
+  if (!page.paused) return;
+  // One after the other; of those that have to wait, the last one counts.
+  if (page.stepping) {
+    page.later = [number, by];
+    return;
+  }
   page.stepping = true;
-  link.send({ type: 'step', number: page.state.number, by });
+  link.send({ type: 'step', number, by });
+}
+
+function stepped() {
+  const later = page.later;
+  page.stepping = false;
+  page.later = null;
+  if (later) seek(...later);
 }
 
 const KEYS = {
-  Escape: () => stage.cancel() || command({ type: 'reset' }),
+  Escape: () => stage.cancel() || (page.recording ? mark('unmark') : command({ type: 'reset' })),
   ' ': pause,
   ArrowLeft: () => step(-1),
   ArrowRight: () => step(1),
 };
 
 document.addEventListener('keydown', event => {
-  const typing = event.target.closest('input, select, button, summary, a');
+  const typing = event.target.closest('input:not(#place), select, button, summary, a');
   const action = KEYS[event.key];
   if (!action || event.ctrlKey || event.altKey || event.metaKey) return;
   if (typing && event.key !== 'Escape') return;
@@ -174,9 +234,15 @@ element('enable').addEventListener('click', () => command({ type: 'enable', on: 
 element('palette').addEventListener('change', look);
 element('confidence').addEventListener('change', look);
 element('sound').addEventListener('change', () => element('sound').checked && beep());
+element('absent').addEventListener('click', () => mark('absent'));
+element('unmark').addEventListener('click', () => mark('unmark'));
+element('place').addEventListener('input', () => {
+  if (!page.paused) pause();
+  seek(Number(element('place').value), 0);
+});
 element('numbers').addEventListener('submit', event => {
   event.preventDefault();
   const fields = new FormData(event.target);
   const box = ['x', 'y', 'width', 'height'].map(name => Number(fields.get(name)));
-  if (page.state) command({ type: 'start', stamp: page.state.stamp, box });
+  if (page.state) start(box, page.state);
 });

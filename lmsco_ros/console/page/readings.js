@@ -4,7 +4,8 @@ const NONE = '–';
 const element = name => document.getElementById(name);
 const STATES = {
   '': 'no word from the tracker', idle: 'no target', disabled: 'tracker is stopped',
-  tracking: 'tracking', uncertain: 'uncertain', lost: 'lost',
+  tracking: 'tracking', uncertain: 'uncertain', lost: 'lost', absent: 'no target here',
+  unmarked: 'not marked',
 };
 
 const fixed = (value, digits, unit = '') => (

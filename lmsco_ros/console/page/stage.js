@@ -1,8 +1,10 @@
 // The camera image with its boxes, and what a pointer does on it.
 
 const DRAG_PIXELS = 6;
-const COLORS = { tracking: '#3ee6d6', uncertain: '#ffc457' };
-const DASHES = { tracking: [], uncertain: [8, 5] };
+const COLORS = {
+  tracking: '#3ee6d6', uncertain: '#ffc457', marked: '#3ee6d6', interpolated: '#ffc457',
+};
+const DASHES = { uncertain: [8, 5], interpolated: [8, 5] };
 
 export class Stage {
   /** `on` has drag(box), click(x, y) and pick(id), in pixels of the image. */
