@@ -202,7 +202,9 @@ class Page:
         WebDriverWait(self.browser, PATIENCE, 0.05).until(lambda browser: condition())
 
     def key(self, key):
-        ActionChains(self.browser).send_keys_to_element(self.canvas, key).perform()
+        # Without a click, which would start on what is there.
+        self.browser.execute_script('arguments[0].focus();', self.canvas)
+        ActionChains(self.browser).send_keys(key).perform()
 
     def drag(self, box):
         """Drag a box given in pixels of the image."""

@@ -15,8 +15,8 @@ const strip = new Strip(element('strip'));
 const history = new History(element('history'));
 const stage = new Stage(element('stage'), {
   drag: (box, seen) => start(box, seen),
-  click: (x, y, seen) => command({ type: 'point', stamp: seen.stamp, x, y }),
-  pick: id => command({ type: 'select', id }),
+  click: (x, y, seen) => page.recording || command({ type: 'point', stamp: seen.stamp, x, y }),
+  pick: id => page.recording || command({ type: 'select', id }),
 });
 const link = new Link({ up: isUp, frame: takeFrame, message: takeMessage });
 
