@@ -20,6 +20,8 @@ Needs Chromium, its driver and selenium, and is skipped with the reason where on
 
 import contextlib
 import json
+import os
+from pathlib import Path
 import queue
 import shutil
 import threading
@@ -408,6 +410,24 @@ def test_nothing_is_wider_than_the_window(site, address, size):
             'return document.documentElement.scrollWidth - window.innerWidth')
         assert wide <= 0
         assert not page.complaints()
+
+
+@pytest.mark.skipif('LMSCO_AXE' not in os.environ,
+                    reason='set LMSCO_AXE to the file axe.min.js of the npm package axe-core')
+@pytest.mark.parametrize('scheme', ['light', 'dark'])
+def test_accessibility_checker_finds_nothing(page, site, scheme):
+    page.start(site)
+    page.drag((20, 200, 30, 30))
+    page.until(lambda: len(page.state['targets']) == 2)
+    page.browser.execute_cdp_cmd('Emulation.setEmulatedMedia', {
+        'features': [{'name': 'prefers-color-scheme', 'value': scheme}]})
+    page.browser.execute_script(Path(os.environ['LMSCO_AXE']).read_text())
+    for hidden, state in ((False, 'tracking'), (True, 'lost')):
+        site.hidden = hidden
+        page.until(lambda: page.state['state'] == state)
+        found = page.browser.execute_async_script(
+            'axe.run().then(arguments[0]);')
+        assert not [(each['id'], each['nodes'][0]['target']) for each in found['violations']]
 
 
 def test_target_is_marked_in_a_recording(frames, browser, tmp_path):
