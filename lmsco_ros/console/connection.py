@@ -27,8 +27,8 @@ from lmsco_ros.console.desk import Desk, Operator
 from lmsco_ros.console.moments import Moment
 from lmsco_ros.console.picture import Look
 from lmsco_ros.console.requests import (
-    Absent, Command, Enable, Next, parse_request, Point, RequestError, Reset, Select, Start, Step,
-    Unmark)
+    Absent, Command, Enable, Next, parse_request, Point, Record, RequestError, Reset, Select,
+    Start, Step, Unmark)
 from lmsco_ros.core.errors import LMSCOError
 
 _ANSWER_SECONDS = 5.0
@@ -149,8 +149,8 @@ class Connection:
             raise RequestError('only the frames of a recording can be marked')
         (marker.mark_absent if isinstance(command, Absent) else marker.unmark)(command.stamp)
 
-    async def _call(self, operator: Operator, command: Reset | Enable) -> None:
-        """Have a service do something, and tell its answer."""
+    async def _call(self, operator: Operator, command: Reset | Enable | Record) -> None:
+        """Have something done that is answered, and tell the answer."""
         future: asyncio.Future[tuple[bool, str]] = self._loop.create_future()
 
         def settle(done: bool, text: str) -> None:
@@ -162,6 +162,8 @@ class Connection:
 
         if isinstance(command, Reset):
             operator.reset(answered)
+        elif isinstance(command, Record):
+            operator.record(command.on, answered)
         else:
             operator.enable(command.on, answered)
         try:

@@ -17,7 +17,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+import contextlib
 import functools
+from pathlib import Path
 import threading
 from typing import Any
 
@@ -39,7 +41,10 @@ from lmsco_ros.console.feed import Feed, Rate
 from lmsco_ros.console.frames import LiveFrames
 from lmsco_ros.console.moments import Assembly, Moment
 from lmsco_ros.console.picture import Pictures
+from lmsco_ros.console.recorder import Recorder
 from lmsco_ros.console.settings import ConsoleSettings
+from lmsco_ros.extras import require_extra
+from lmsco_ros.replay.errors import OutputError
 from msg_adapters.boxes import box_from_polygon, polygon_from_box
 from msg_adapters.compressed import image_from_compressed
 from msg_adapters.errors import MessageError
@@ -87,7 +92,10 @@ class ConsoleNode(Node):
         self._feed = Feed(self.settings.history_megabytes)
         self.desk = Desk(
             lambda: LiveFrames(self._feed), Chronicle(pictures.thumbnail), pictures, self,
-            Rate(), Rate(), topic, self.settings.read_only)
+            Rate(), Rate(), topic, self.settings.read_only,
+            recorded=(lambda: self._recorder.count) if self.settings.record_folder else None)
+        self._recorder = self._make_recorder()
+        self._orders: list[tuple[bool, Answer]] = []
         self._assembly = Assembly(self._deliver)
         self._listen()
         self._starts = self.create_publisher(PolygonStamped, 'init_box_stamped', _DEPTH)
@@ -97,6 +105,12 @@ class ConsoleNode(Node):
         self._set_enabled = self.create_client(SetBool, self._of_tracker('set_enabled'))
         # It must tick while a simulated clock stands still, too.
         self.create_timer(_TICK_SECONDS, self._tick, clock=Clock(clock_type=ClockType.STEADY_TIME))
+
+    def destroy_node(self) -> None:
+        """Finish what is recorded, and take the node away."""
+        with contextlib.suppress(OutputError):
+            self._recorder.stop()
+        super().destroy_node()
 
     def start(self, stamp: int, box: tuple[float, float, float, float]) -> None:
         """Publish a box to start on, with the stamp of the frame that it was drawn on."""
@@ -118,6 +132,15 @@ class ConsoleNode(Node):
         """Call the service that pauses and resumes."""
         self._call(self._set_enabled, SetBool.Request(data=on), answer)
 
+    def record(self, on: bool, answer: Answer) -> None:
+        """Begin or end a recording at the next tick."""
+        if not self.settings.record_folder:
+            answer(False, 'the console was started without a folder for recordings; set '
+                   'record_folder')
+            return
+        with self._lock:
+            self._orders.append((on, answer))
+
     def want_map(self, who: object, wanted: bool) -> None:
         """Listen to confidence maps as long as somebody wants them, from the next tick on."""
         with self._lock:
@@ -129,6 +152,16 @@ class ConsoleNode(Node):
         return ConsoleSettings(**{
             name: self.declare_parameter(name, getattr(defaults, name), read_only).value
             for name in defaults.__dataclass_fields__})
+
+    def _make_recorder(self) -> Recorder:
+        """Return what records all that a page shows."""
+        if self.settings.record_folder:
+            require_extra('cli', 'a recording', 'rosbags')
+        images = CompressedImage if self.settings.image_transport == 'compressed' else Image
+        return Recorder(self, Path(self.settings.record_folder), {
+            self.desk.image_topic: images, self._of_tracker('status'): DiagnosticArray,
+            self._of_tracker('box'): PolygonStamped,
+            self._of_tracker('boxes'): PolygonInstanceStamped})
 
     def _of_tracker(self, name: str) -> str:
         return f'{self.settings.tracker}/{name}'
@@ -199,7 +232,18 @@ class ConsoleNode(Node):
             self.destroy_subscription(self._maps)
             self._maps = None
         self._assembly.with_map = wanted
+        self._obey()
         self._assembly.release()
+
+    def _obey(self) -> None:
+        """Begin and end recordings, in the thread that may change what is listened to."""
+        with self._lock:
+            orders, self._orders = self._orders, []
+        for on, answer in orders:
+            try:
+                answer(True, self._recorder.start() if on else self._recorder.stop())
+            except OutputError as error:
+                answer(False, str(error))
 
     def _call(self, client: Any, request: Any, answer: Answer) -> None:
         if not client.service_is_ready():

@@ -47,6 +47,9 @@ class Operator(Protocol):
     def enable(self, on: bool, answer: Answer) -> None:
         """Let the tracker go on, or pause."""
 
+    def record(self, on: bool, answer: Answer) -> None:
+        """Begin or end a recording."""
+
     def want_map(self, who: object, wanted: bool) -> None:
         """Have confidence maps as long as somebody wants them."""
 
@@ -83,6 +86,9 @@ class Desk:
         The operator, where it has a recording to mark in place of a tracker.
     length : int
         Frames of the recording.
+    recorded : callable or None
+        Returns how many messages were recorded so far, None while nothing is recorded; where
+        pages may record at all.
 
     """
 
@@ -96,3 +102,4 @@ class Desk:
     read_only: bool = False
     marker: Marker | None = None
     length: int = 0
+    recorded: Callable[[], int | None] | None = None

@@ -121,7 +121,6 @@ class Assembly:
         self._clock = clock
         self._waiting: dict[int, _Parts] = {}
         self._images = 0
-        self._delivered = 0
         self._heard = clock()
 
     def add_image(self, stamp: int, image: npt.NDArray) -> None:
@@ -165,11 +164,9 @@ class Assembly:
         parts = self._waiting[stamp]
         self._waiting = {other: later for other, later in self._waiting.items()
                          if later.image is None or later.number > number}
-        if number > self._delivered:
-            self._delivered = number
-            assert parts.image is not None, 'only those with an image are ready'
-            self._deliver(Moment(number, stamp, parts.received, parts.image, parts.statuses,
-                                 dict(parts.boxes), parts.confidence))
+        assert parts.image is not None, 'only those with an image are ready'
+        self._deliver(Moment(number, stamp, parts.received, parts.image, parts.statuses,
+                             dict(parts.boxes), parts.confidence))
 
     def _parts(self, stamp: int) -> _Parts:
         return self._waiting.setdefault(stamp, _Parts())

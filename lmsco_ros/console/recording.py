@@ -191,6 +191,10 @@ class Annotator:
         """Refuse."""
         answer(False, 'a recording has no tracker to stop')
 
+    def record(self, on: bool, answer: Answer) -> None:
+        """Refuse."""
+        answer(False, 'what is shown is a recording')
+
     def want_map(self, who: object, wanted: bool) -> None:
         """Do nothing: there are no maps."""
 

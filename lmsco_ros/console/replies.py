@@ -38,8 +38,8 @@ def greeting(desk: Desk) -> str:
     """Return what a page is told first: what it may do, and what happened before."""
     return _text({
         'type': 'hello', 'is_recording': desk.marker is not None, 'length': desk.length,
-        'read_only': desk.read_only, 'topic': desk.image_topic,
-        'palettes': list(PALETTES),
+        'can_record': desk.recorded is not None, 'read_only': desk.read_only,
+        'topic': desk.image_topic, 'palettes': list(PALETTES),
         'strip': [asdict(sample) for sample in desk.chronicle.strip()]})
 
 
@@ -90,6 +90,7 @@ def frame(moment: Moment, picture: bytes, desk: Desk, events: Iterable[Event],
             'tracker_silence': desk.answers.silence,
             'latency_ms': selected.latency_ms if selected is not None else None,
             'tracker_ms': selected.tracker_ms if selected is not None else None,
+            'recorded': desk.recorded() if desk.recorded is not None else None,
             'dropped': selected.dropped_frames if selected is not None else None,
             'delay_ms': None if delay is None else 1e3 * delay},
         'events': [asdict(event) for event in events]}).encode()

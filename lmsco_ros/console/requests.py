@@ -98,7 +98,14 @@ class Unmark:
     stamp: int
 
 
-Command = Start | Point | Select | Reset | Enable | Absent | Unmark
+@dataclass(frozen=True)
+class Record:
+    """Begin or end a recording."""
+
+    on: bool
+
+
+Command = Start | Point | Select | Reset | Enable | Record | Absent | Unmark
 Request = Command | Next | Step | Look
 
 
@@ -192,6 +199,7 @@ _READERS: dict[str, Callable[[Mapping[str, Any]], Request]] = {
     'point': _point,
     'select': lambda fields: Select(_whole(fields, 'id', 0, 2 ** 32 - 1)),
     'reset': lambda fields: Reset(),
+    'record': lambda fields: Record(_flag(fields, 'on')),
     'absent': lambda fields: Absent(_stamp(fields)),
     'unmark': lambda fields: Unmark(_stamp(fields)),
     'enable': lambda fields: Enable(_flag(fields, 'on')),

@@ -39,6 +39,8 @@ class ConsoleSettings:
         Whether pages may only look.
     allowed_origins : str
         Of pages behind a reverse proxy, separated by commas.
+    record_folder : str
+        Gets the bags that pages have recorded; empty: they cannot.
     history_megabytes : float
         Of images that are kept for stepping back.
 
@@ -50,4 +52,5 @@ class ConsoleSettings:
     port: int = 8080
     read_only: bool = False
     allowed_origins: str = ''
+    record_folder: str = ''
     history_megabytes: float = 64.0

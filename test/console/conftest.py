@@ -53,6 +53,10 @@ class FakeOperator:
         self.asked.append(('enable', on))
         answer(False, 'not active')
 
+    def record(self, on, answer):
+        self.asked.append(('record', on))
+        answer(True, 'recorded')
+
     def want_map(self, who, wanted):
         (self.maps.add if wanted else self.maps.discard)(id(who))
 

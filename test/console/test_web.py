@@ -89,6 +89,7 @@ def test_silence_is_told(page, desk, monkeypatch):
     ({'type': 'point', 'stamp': '7', 'x': 3.5, 'y': 4}, ('point', 7, 3.5, 4)),
     ({'type': 'select', 'id': 4}, ('select', 4)),
     ({'type': 'reset'}, ('reset',)),
+    ({'type': 'record', 'on': True}, ('record', True)),
     ({'type': 'enable', 'on': False}, ('enable', False))])
 def test_commands_reach_the_operator(page, desk, message, asked):
     page.send_json(message)
@@ -180,6 +181,7 @@ def test_read_only_pages_may_only_look(client, make_desk, feed, moment, read_fra
     with client(desk).websocket_connect('/socket', headers=OWN) as socket:
         assert socket.receive_json()['read_only'] is True
         for message in ({'type': 'reset'}, {'type': 'select', 'id': 1},
+                        {'type': 'record', 'on': True}, {'type': 'absent', 'stamp': '1'},
                         {'type': 'enable', 'on': False}, {'type': 'point', 'stamp': '1', 'x': 1,
                                                           'y': 1},
                         {'type': 'start', 'stamp': '1', 'box': [1, 1, 1, 1]}):

@@ -21,6 +21,7 @@ import numpy as np
 import pytest
 from rclpy.exceptions import ParameterException
 from rclpy.parameter import Parameter
+from rosbags.highlevel import AnyReader
 from sensor_msgs.msg import Image
 from std_msgs.msg import UInt32
 
@@ -178,6 +179,46 @@ def test_map_is_listened_to_only_when_it_is_wanted(watched):
     console.want_map(one, False)
     console.want_map(other, False)
     graph.spin_until(lambda: listeners() == 0)
+
+
+def test_all_that_is_shown_is_recorded(running, console, tmp_path):
+    running.console, answers = console(record_folder=str(tmp_path / 'bags')), []
+    graph = running.graph
+    running.console.record(True, lambda done, text: answers.append((done, text)))
+    graph.spin_until(lambda: answers)
+    assert answers[0][0] and str(tmp_path) in answers[0][1]
+    listeners = {'/lmsco_tracker/status': 3, '/lmsco_tracker/boxes': 2, '/image_raw': 3,
+                 '/lmsco_tracker/box': 2, '/init_box_stamped': 1}
+    for publisher in (*running.node.publishers, *graph.user.publishers,
+                      *running.console.publishers):
+        graph.spin_until(lambda: publisher.get_subscription_count()
+                         >= listeners.get(publisher.topic_name, 0))
+    seen = follow(running)
+    shown(running, graph.image(9))
+    # Of each frame an image and a status, of the start one more, and two boxes of each kind.
+    graph.spin_until(lambda: running.console.desk.recorded() >= 9)
+    running.console.record(False, lambda done, text: answers.append((done, text)))
+    graph.spin_until(lambda: len(answers) == 2)
+    assert answers[1] == (True, '9 messages were recorded')
+    assert running.console.desk.recorded() is None
+    (bag,) = (tmp_path / 'bags').iterdir()
+    with AnyReader([bag]) as reader:
+        topics = {connection.topic for connection, *_ in reader.messages()}
+        images = [reader.deserialize(data, connection.msgtype)
+                  for connection, _, data in reader.messages()
+                  if connection.topic == '/image_raw']
+    assert topics == {'/image_raw', *(f'/lmsco_tracker/{name}'
+                                      for name in ('status', 'box', 'boxes'))}
+    stamps = [image.header.stamp.sec * 10 ** 9 + image.header.stamp.nanosec for image in images]
+    assert stamps[0] == seen.stamp and len(stamps) == 2
+
+
+@pytest.mark.parametrize('folder, words', [('', 'record_folder'), ('/dev/null/bags', 'null')])
+def test_recording_that_cannot_be_is_told(graph, console, folder, words):
+    node, answers = console(record_folder=folder), []
+    node.record(True, lambda done, text: answers.append((done, text)))
+    graph.spin_until(lambda: answers)
+    assert not answers[0][0] and words in answers[0][1]
 
 
 def test_bad_messages_are_survived(watched):

@@ -91,6 +91,7 @@ function takeMessage(message) {
   if (message.type === 'hello') {
     page.readOnly = message.read_only;
     record(message);
+    element('recorder').hidden = !message.can_record;
     document.body.classList.toggle('looks', message.read_only);
     stage.locked = message.read_only;
     element('read-only').hidden = !message.read_only;
@@ -145,6 +146,9 @@ function tell(state) {
   page.enabled = state.state !== 'disabled';
   element('enable').textContent = page.enabled ? 'Stop tracker' : 'Resume tracker';
   element('enable').setAttribute('aria-pressed', String(!page.enabled));
+  const count = state.health.recorded;
+  element('record').textContent = count === null ? 'Record' : `Stop recording (${count} messages)`;
+  element('record').setAttribute('aria-pressed', String(count !== null));
   for (const event of state.events) {
     if (event.kind === 'refused') say(event.text, true);
     if (event.kind === 'accepted') say(`target ${event.track_id} is followed`);
@@ -234,6 +238,9 @@ element('enable').addEventListener('click', () => command({ type: 'enable', on: 
 element('palette').addEventListener('change', look);
 element('confidence').addEventListener('change', look);
 element('sound').addEventListener('change', () => element('sound').checked && beep());
+element('record').addEventListener('click', () => command({
+  type: 'record', on: element('record').getAttribute('aria-pressed') === 'false',
+}));
 element('absent').addEventListener('click', () => mark('absent'));
 element('unmark').addEventListener('click', () => mark('unmark'));
 element('place').addEventListener('input', () => {
