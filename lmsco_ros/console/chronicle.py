@@ -30,6 +30,8 @@ from msg_adapters.status import FrameStatus
 _MOST_EVENTS = 50
 _STRIP_SECONDS = 120.0
 _SAMPLE_SECONDS = 0.1
+# Frames that are further back, in nanoseconds, are those of a recording that starts over.
+_LONGEST_CATCH_UP = 10 * 10 ** 9
 _LOST, _FOUND, _DROPPED = 'lost', 'found', 'dropped'
 
 
@@ -110,18 +112,22 @@ class Chronicle:
         self._samples: deque[Sample] = deque()
         self._states: dict[int, str] = {}
         self._seen: dict[int, tuple[Moment, Box]] = {}
+        self._newest = -1
         self._numbers = 0
         self._revisions = 0
 
-    def hear(self, statuses: Sequence[FrameStatus]) -> None:
-        """Note what a status tells that was not so before."""
+    def hear(self, stamp: int, statuses: Sequence[FrameStatus]) -> None:
+        """Note what is told of the frame with a stamp (nanoseconds) that was not so before."""
         with self._lock:
             for status in statuses:
                 if status.start:
                     self._note(status.start, status.track_id, status.message)
                 if status.state in (*FOUND, _LOST):
                     self._compare(status)
-            self._miss(statuses)
+            # While a new target catches up with the newest frame, the others are not told of.
+            if not self._newest - _LONGEST_CATCH_UP <= stamp <= self._newest:
+                self._newest = stamp
+                self._miss(statuses)
 
     def see(self, moment: Moment) -> None:
         """Take a sample of a frame, and the thumbnails that events wait for."""

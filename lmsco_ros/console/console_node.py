@@ -207,8 +207,9 @@ class ConsoleNode(Node):
     def _on_status(self, message: DiagnosticArray) -> None:
         statuses = tuple(statuses_from_message(message))
         self.desk.answers.count()
-        self.desk.chronicle.hear(statuses)
-        self._assembly.add_statuses(_stamp(message.header), statuses)
+        stamp = _stamp(message.header)
+        self.desk.chronicle.hear(stamp, statuses)
+        self._assembly.add_statuses(stamp, statuses)
 
     def _on_box(self, message: PolygonInstanceStamped) -> None:
         corners = PolygonStamped(header=message.header, polygon=message.polygon.polygon)

@@ -14,6 +14,8 @@
 
 """What belongs together comes together, by its stamp, and what happened is noted."""
 
+import itertools
+
 import numpy as np
 import pytest
 
@@ -157,30 +159,47 @@ def chronicle(clock):
     return Chronicle(lambda moment, box: b'picture', clock)
 
 
+def hear(chronicle, statuses, stamps=itertools.count(1)):
+    """Have the chronicle hear of the next frame."""
+    chronicle.hear(next(stamps), statuses)
+
+
 def kinds(chronicle):
     return [(event.kind, event.track_id) for event in chronicle.since(0)]
 
 
 def test_losses_and_finds_are_noted_once(chronicle, status):
     for state in ('tracking', 'lost', 'lost', 'uncertain', 'tracking', 'lost'):
-        chronicle.hear([status(state)])
+        hear(chronicle, [status(state)])
     assert kinds(chronicle) == [('lost', 1), ('found', 1), ('lost', 1)]
 
 
 def test_starts_and_drops_are_noted(chronicle, status):
-    chronicle.hear([status(start='accepted')])
-    chronicle.hear([status(), status('refused', track_id=1, start='refused')])
-    chronicle.hear([status(track_id=2, start='accepted')])
-    chronicle.hear([status('disabled', track_id=0)])
-    chronicle.hear([status('idle', track_id=0)])
+    hear(chronicle, [status(start='accepted')])
+    hear(chronicle, [status(), status('refused', track_id=1, start='refused')])
+    hear(chronicle, [status(track_id=2, start='accepted')])
+    hear(chronicle, [status('disabled', track_id=0)])
+    hear(chronicle, [status('idle', track_id=0)])
     assert kinds(chronicle) == [('accepted', 1), ('refused', 1), ('accepted', 2), ('dropped', 1),
                                 ('dropped', 2)]
 
 
+def test_targets_that_are_not_told_of_while_another_catches_up_are_kept(chronicle, status):
+    second = 10 ** 9
+    chronicle.hear(50 * second, [status()])
+    for stamp in (49 * second, 50 * second):
+        chronicle.hear(stamp, [status(track_id=2)])
+    chronicle.hear(51 * second, [status(), status(track_id=2)])
+    assert kinds(chronicle) == []
+    # A recording that starts over, where the second one is given up.
+    chronicle.hear(second, [status()])
+    assert kinds(chronicle) == [('dropped', 2)]
+
+
 def test_loss_shows_where_the_target_was_seen_last(chronicle, status, moment):
-    chronicle.hear([status()])
+    hear(chronicle, [status()])
     chronicle.see(moment(1))
-    chronicle.hear([status('lost')])
+    hear(chronicle, [status('lost')])
     (event,) = chronicle.since(0)
     assert event.thumbnail == 'cGljdHVyZQ=='
 
@@ -233,7 +252,7 @@ def test_thumbnail_is_of_a_frame_in_which_the_target_was_certain(clock, status, 
     drawn = []
     chronicle = Chronicle(lambda moment, box: drawn.append(moment.number) or b'', clock)
     for number, state in enumerate(('tracking', 'tracking', 'uncertain'), 1):
-        chronicle.hear([status(state)])
+        hear(chronicle, [status(state)])
         chronicle.see(moment(number, state))
-    chronicle.hear([status('lost')])
+    hear(chronicle, [status('lost')])
     assert drawn == [2]

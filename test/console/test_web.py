@@ -166,7 +166,7 @@ def test_what_happened_is_told_once_and_again_when_it_changed(
         return read_frame(page.receive_bytes())[0]['events']
 
     feed.add(moment(1))
-    desk.chronicle.hear([status(start='accepted')])
+    desk.chronicle.hear(1, [status(start='accepted')])
     (event,) = events(1)
     assert (event['kind'], event['track_id'], event['thumbnail']) == ('accepted', 1, '')
     assert events(1) == []

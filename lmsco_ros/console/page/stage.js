@@ -28,7 +28,6 @@ export class Stage {
     if (this.image) this.image.close();
     this.image = image;
     this.state = state;
-    this.canvas.style.setProperty('--aspect', `${state.width} / ${state.height}`);
     this.canvas.parentElement.style.setProperty('--aspect', `${state.width} / ${state.height}`);
     this.draw();
     this.describe();
