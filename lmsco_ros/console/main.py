@@ -17,13 +17,10 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-import contextlib
-import os
 import sys
-import traceback
 
 from lmsco_ros.extras import MissingExtraError, require_extra
-from lmsco_ros.node.main import Ending, FAILED, MISUSED
+from lmsco_ros.node.main import Ending, FAILED, MISUSED, run_program
 from lmsco_ros.node.ros_arguments import split_arguments
 
 _HELP = """\
@@ -40,21 +37,7 @@ Everything about the node stands behind --ros-args:
 
 def main() -> None:
     """Run the console until a signal comes, and end the process: 0 ended, 1 failed, 2 misused."""
-    ending = Ending()
-    ending.watch()
-    code = FAILED
-    try:
-        code = _serve(sys.argv[1:], ending)
-    except BaseException:  # noqa: B902
-        if ending.requested.is_set():
-            code = 0
-        else:
-            traceback.print_exc()
-    finally:
-        for stream in (sys.stdout, sys.stderr):
-            with contextlib.suppress(OSError, ValueError):
-                stream.flush()
-        os._exit(code)
+    run_program('console', _serve)
 
 
 def _serve(arguments: Sequence[str], ending: Ending) -> int:
