@@ -36,6 +36,7 @@ setup(
     package_data={
         PACKAGE: [
             'py.typed',
+            'console/page/*',
             'core/weights/*.safetensors',
             'evaluation/**/*.html',
             'evaluation/**/*.txt',

@@ -21,7 +21,7 @@ ROS, NumPy and PyTorch come when signals are heeded.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 import contextlib
 import os
 import signal
@@ -29,6 +29,7 @@ import sys
 import threading
 import time
 import traceback
+from typing import NoReturn
 
 from lmsco_ros.node.ros_arguments import split_arguments
 
@@ -87,13 +88,29 @@ class Ending:
 
 def main() -> None:
     """Run the node until a signal comes, and end the process: 0 ended, 1 failed, 2 misused."""
+    run_program('tracker_node', _serve)
+
+
+def run_program(name: str, serve: Callable[[Sequence[str], Ending], int]) -> NoReturn:
+    """
+    Run what serves until a signal comes, and end the process with the code that it returns.
+
+    Parameters
+    ----------
+    name : str
+        Of the program, for what it says.
+    serve : callable
+        Gets the arguments of the command line, and tells by its code: 0 ended, 1 failed, 2
+        misused.
+
+    """
     ending = Ending()
     ending.watch()
     code = FAILED
     try:
-        code = _serve(sys.argv[1:], ending)
+        code = serve(sys.argv[1:], ending)
     except BaseException:  # noqa: B902
-        code = _unforeseen(ending)
+        code = _unforeseen(name, ending)
     finally:
         # A tracker that is still at work would crash in an interpreter that takes itself down.
         for stream in (sys.stdout, sys.stderr):
@@ -139,13 +156,13 @@ def _answer(own: Sequence[str]) -> int:
     return 0
 
 
-def _unforeseen(ending: Ending) -> int:
+def _unforeseen(name: str, ending: Ending) -> int:
     """Tell of an error of this program; in one line when the process ends anyway."""
     if not ending.requested.is_set():
         traceback.print_exc()
         return FAILED
     error = sys.exc_info()[1]
-    _fail(f'while ending: {type(error).__name__}: {_first_line(error)}')
+    print(f'{name}: while ending: {type(error).__name__}: {_first_line(error)}', file=sys.stderr)
     return 0
 
 

@@ -56,7 +56,7 @@ def run(arguments: Sequence[str], ending: threading.Event) -> int:
 
     """
     try:
-        with _ros(arguments), _node(arguments) as node:
+        with in_ros(arguments), _node(arguments) as node:
             return _spin(node, ending)
     except StartError as error:
         print(f'tracker_node: {error}', file=sys.stderr)
@@ -64,7 +64,7 @@ def run(arguments: Sequence[str], ending: threading.Event) -> int:
 
 
 @contextlib.contextmanager
-def _ros(arguments: Sequence[str]) -> Iterator[None]:
+def in_ros(arguments: Sequence[str]) -> Iterator[None]:
     """Join ROS; raise StartError when it refuses the arguments."""
     check_remappings(arguments)
     # What ROS would log of arguments that it refuses is in the error, too.

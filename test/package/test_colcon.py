@@ -75,7 +75,9 @@ def test_ros_finds_the_package(workspace):
     assert (prefix / 'share/lmsco_ros/package.xml').is_file()
     assert (prefix / 'share/lmsco_ros/launch/tracker.launch.py').is_file()
     assert (prefix / 'share/lmsco_ros/config/tracker.yaml').is_file()
-    assert (prefix / 'lib/lmsco_ros/tracker_node').stat().st_mode & 0o111
+    assert (prefix / 'share/lmsco_ros/launch/console.launch.py').is_file()
+    for program in ('tracker_node', 'console'):
+        assert (prefix / 'lib/lmsco_ros' / program).stat().st_mode & 0o111
 
 
 def test_installed_code_is_what_runs(workspace):

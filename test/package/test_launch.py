@@ -26,6 +26,7 @@ LAUNCH_FILE = REPOSITORY / 'launch' / 'tracker.launch.py'
 PAN_TILT_FILE = REPOSITORY / 'examples' / 'launch' / 'pan_tilt.launch.py'
 ARGUMENTS = {'params_file', 'camera_profile', 'image_topic', 'camera_info_topic', 'namespace',
              'use_large_image_profile'}
+CONSOLE_FILE = REPOSITORY / 'launch' / 'console.launch.py'
 
 
 class Recorded:
@@ -137,3 +138,24 @@ def test_head_is_started_beside_the_tracker(entities, monkeypatch):
     python, program = head.named['cmd']
     assert python == sys.executable and Path(program).name == 'ros_pan_tilt.py'
     assert Path(program).is_file()
+
+
+def test_console_is_started_beside_the_tracker(entities, monkeypatch):
+    """Its arguments reach its node, and the tracker comes from its own launch file."""
+    actions, sources = sys.modules['launch.actions'], ModuleType('launch.sources')
+    actions.IncludeLaunchDescription = type('IncludeLaunchDescription', (Recorded,), {})
+    sources.PythonLaunchDescriptionSource = type(
+        'PythonLaunchDescriptionSource', (Recorded,), {})
+    monkeypatch.setitem(sys.modules, 'launch.launch_description_sources', sources)
+    found = load(CONSOLE_FILE).positional[0]
+    declared = {item.positional[0]: item.named for item in found
+                if type(item).__name__ == 'DeclareLaunchArgument'}
+    assert set(declared) == {'image_topic', 'namespace', 'host', 'port', 'read_only'}
+    assert all(item['description'] for item in declared.values())
+    *_, included, node = found
+    assert included.positional[0].positional == (str(LAUNCH_FILE),)
+    assert (node.named['package'], node.named['executable']) == ('lmsco_ros', 'console')
+    handed = {name: value.positional[0] for name, value in node.named['parameters'][0].items()}
+    assert handed == {name: name for name in ('host', 'port', 'read_only')}
+    ((topic, replacement),) = node.named['remappings']
+    assert topic == 'image_raw' and replacement.positional == ('image_topic',)

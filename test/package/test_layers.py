@@ -24,7 +24,7 @@ REPOSITORY = Path(__file__).resolve().parents[2]
 
 # From the top down; what stands on one line does not know of its neighbors.
 PACKAGES = (
-    ('benchmarks',), ('training',), ('cli',), ('replay',), ('evaluation', 'node'),
+    ('benchmarks',), ('training',), ('cli',), ('console',), ('replay',), ('evaluation', 'node'),
     ('visualization', 'msg_adapters'), ('synthetic', 'media'), ('core',),
     ('extras',))
 CORE = (

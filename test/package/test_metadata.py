@@ -34,13 +34,13 @@ from lmsco_ros.extras import MODULES
 REPOSITORY = Path(__file__).resolve().parents[2]
 LIBRARIES = ('lmsco_ros', 'msg_adapters')
 # Installed from the package index where ROS 2 is: Ubuntu 24.04 has no package of them, or one that
-# is too old (protobuf, typer).
+# is too old (protobuf, starlette, typer, uvicorn, websockets).
 WITHOUT_ROSDEP_KEY = {
     'array-api-compat', 'av', 'backports-zstd', 'lz4', 'protobuf', 'rosbags', 'safetensors',
-    'threadpoolctl', 'torch', 'typer'}
+    'starlette', 'threadpoolctl', 'torch', 'typer', 'uvicorn', 'websockets'}
 # The others are for evaluation against foreign code and stay out of the environment.
-INSTALLED_EXTRA = re.compile(r'extra == "(cli|eval|weights|ros|test)"')
-OF_EXTRA = re.compile(r'extra == "(cli|eval|weights)"')
+INSTALLED_EXTRA = re.compile(r'extra == "(cli|eval|weights|console|ros|test|browser-test)"')
+OF_EXTRA = re.compile(r'extra == "(cli|eval|weights|console)"')
 # Modules by distributions where the names differ.
 DISTRIBUTIONS = {
     'backports.zstd': 'backports-zstd', 'google.protobuf': 'protobuf', 'trax': 'vot-trax'}
@@ -197,6 +197,7 @@ def test_wheel_holds_what_ros_looks_up(wheel):
         'share/lmsco_ros/config/tracker.yaml',
         *(f'share/lmsco_ros/config/cameras/{profile.name}'
           for profile in (REPOSITORY / 'config' / 'cameras').iterdir()),
+        'share/lmsco_ros/launch/console.launch.py',
         'share/lmsco_ros/launch/tracker.launch.py',
     } <= shared
 
@@ -211,7 +212,7 @@ def test_console_scripts_can_be_imported(wheel):
     """Each entry point names a function that exists."""
     name = next(name for name in wheel.namelist() if name.endswith('entry_points.txt'))
     scripts = dict(re.findall(r'^(\w+) = (\S+)$', wheel.read(name).decode(), re.M))
-    assert set(scripts) == {'lmsco', 'tracker_node'}
+    assert set(scripts) == {'console', 'lmsco', 'tracker_node'}
     for target in scripts.values():
         module, function = target.split(':')
         imported = __import__(module, fromlist=[function])

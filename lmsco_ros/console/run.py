@@ -1,0 +1,95 @@
+# Copyright 2026 lmsco_ros contributors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The console in its process: node and server started, spun, and taken down."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+import contextlib
+import os
+import sys
+import threading
+
+import rclpy
+from rclpy.exceptions import NameValidationException, ParameterException
+from rclpy.impl.implementation_singleton import rclpy_implementation
+
+from lmsco_ros.console.console_node import ConsoleNode
+from lmsco_ros.console.server import serving
+from lmsco_ros.console.settings import TOKEN_VARIABLE
+from lmsco_ros.node.executor import GuardedExecutor
+from lmsco_ros.node.faults import Faults
+from lmsco_ros.node.ros_arguments import explained, StartError
+from lmsco_ros.node.run import in_ros
+
+# The end of the process is noticed after this time at the latest.
+_LOOK_PERIOD = 0.1
+
+
+def run(arguments: Sequence[str], ending: threading.Event) -> int:
+    """
+    Run the console until the process has to end.
+
+    The token is taken from the environment: everybody on the graph may read parameters.
+
+    Parameters
+    ----------
+    arguments : sequence of str
+        Those for ROS.
+    ending : threading.Event
+        Set when the process has to end.
+
+    Returns
+    -------
+    int
+        Exit code: 1 when it cannot start.
+
+    """
+    try:
+        with in_ros(arguments), _node() as node, serving(
+                node.desk, node.settings, os.environ.get(TOKEN_VARIABLE, '')) as address:
+            node.get_logger().info(f'the page is at {address}')
+            node.get_logger().info(f'waiting for images on {node.desk.image_topic}')
+            _spin(node, ending)
+            return 0
+    except StartError as error:
+        print(f'console: {error}', file=sys.stderr)
+        return 1
+
+
+@contextlib.contextmanager
+def _node() -> Iterator[ConsoleNode]:
+    """Make the node, and take it down."""
+    try:
+        node = ConsoleNode()
+    except (ParameterException, NameValidationException,
+            rclpy_implementation.RCLError) as error:
+        raise StartError(f'{explained(str(error))}; docs/console.md lists the parameters with '
+                         'their types') from error
+    try:
+        yield node
+    finally:
+        node.destroy_node()
+
+
+def _spin(node: ConsoleNode, ending: threading.Event) -> None:
+    faults = Faults(node.get_logger, lambda text: None, rclpy.ok)
+    executor = GuardedExecutor(faults.note)
+    try:
+        executor.add_node(node)
+        while not ending.is_set() and rclpy.ok():
+            executor.spin_once(timeout_sec=_LOOK_PERIOD)
+    finally:
+        executor.shutdown()

@@ -1,0 +1,56 @@
+# Copyright 2026 lmsco_ros contributors
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The parameters of the console; all are read once."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+TOKEN_VARIABLE = 'LMSCO_CONSOLE_TOKEN'
+"""Of the environment, not of ROS: everybody on the graph may read parameters."""
+
+
+@dataclass(frozen=True)
+class ConsoleSettings:
+    """
+    Parameters of the console; all are read once.
+
+    Attributes
+    ----------
+    tracker : str
+        Name of the node of the tracker.
+    image_transport : str
+        raw or compressed, as the tracker's.
+    host, port : str, int
+        Where the page is offered; port 0 takes any that is free.
+    read_only : bool
+        Whether pages may only look.
+    allowed_origins : str
+        Of pages behind a reverse proxy, separated by commas.
+    record_folder : str
+        Gets the bags that pages have recorded; empty: they cannot.
+    history_megabytes : float
+        Of images that are kept for stepping back.
+
+    """
+
+    tracker: str = 'lmsco_tracker'
+    image_transport: str = 'raw'
+    host: str = '127.0.0.1'
+    port: int = 8080
+    read_only: bool = False
+    allowed_origins: str = ''
+    record_folder: str = ''
+    history_megabytes: float = 64.0
