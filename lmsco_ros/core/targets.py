@@ -129,8 +129,8 @@ class Targets:
 
         """
         if self._networks.extent is None:
-            raise ConfigError('the configuration names no network that measures the extent of what '
-                              "is at a point; set extent.network to 'extent', or give a box")
+            raise ConfigError('the configuration names no network that measures the extent of '
+                              "what is at a point; set extent.network to 'extent', or give a box")
         frame = survey(read_frame(image).pixels, self._config.intensity)
         condition = AutomaticGain(self._config.intensity).examine(frame)
         return extent_at(self._networks.extent, FrameView(frame.image, condition.intensity), point)

@@ -42,6 +42,11 @@ from lmsco_ros.core.weights.loading import Networks
 
 __all__ = ['Track']
 
+# How much of the way from its own place to the fused center the filter learns to go: all of it
+# would lead it away with a neighbor that was measured by mistake, nothing would leave it on the
+# part of the target that came into view first.
+_ANCHORING = 0.3
+
 
 class Track:
     """
@@ -188,8 +193,10 @@ class Track:
             self._observer.keep(view, box)
 
     def _learn(self, detection: Detection) -> None:
-        """Store the sample with the target in its middle; when it is time, train the filter."""
-        self._detector.remember(detection, self._box.center)
+        """Store the sample; when it is time, train the filter."""
+        (x, y), (fused_x, fused_y) = detection.center, self._box.center
+        self._detector.remember(detection, (
+            x + _ANCHORING * (fused_x - x), y + _ANCHORING * (fused_y - y)))
         if self._frame % self._config.learning.update_interval == 0:
             self._detector.train()
 

@@ -22,6 +22,7 @@ import sys
 
 import pytest
 
+from lmsco_ros.core import track
 from lmsco_ros.core.extent import fusion
 from lmsco_ros.core.presence.trust import MEASURED, UNMEASURED
 from lmsco_ros.core.weights.registry import find_source
@@ -106,9 +107,10 @@ def test_constants_of_the_fusion_are_those_of_the_code():
     told = {name: float(value) for name, value, *_ in rows(PAGE, 'name | value')}
     assert told == {
         'drawn': fusion._DRAWN, 'drawn pixels': fusion._DRAWN_PIXELS, 'found': fusion._FOUND,
-        'change': fusion._CHANGE, 'change of a part': fusion._CHANGE_OF_PART,
+        'found of a part': fusion._FOUND_OF_PART, 'change': fusion._CHANGE,
         'border': fusion._CHANGE_AT_BORDER, 'convention': fusion._CONVENTION}
     assert f'{fusion._BORDER_PIXELS} pixels away' in PAGE
+    assert f'{track._ANCHORING:.1g}'.lstrip('0') + ' of the way' in PAGE
     assert f'at least {fusion._SMALLEST_SIDE:g} pixels' in PAGE
 
 

@@ -13,7 +13,7 @@
 # limitations under the License.
 
 """
-Rendered sequences with exact extents, to choose by: bodies that enter, turn, come near, meet others.
+Rendered sequences with exact extents, to choose by: bodies that enter, turn, meet others.
 
     python -m training.extent.sequences --windows WINDOWS.npz --output FOLDER
 

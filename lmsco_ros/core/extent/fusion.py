@@ -33,16 +33,17 @@ __all__ = ['EdgeFilter']
 _Array = npt.NDArray[np.float64]
 
 # In sides of the target: the error of a box that a person draws, and that of the correlation
-# filter's center.
-_DRAWN, _FOUND = 0.08, 0.08
-# The change of a side from one frame to the next: of a target in view, of one of which the first
-# box held a part, and what comes to it while a border of the image cuts the target.
-_CHANGE, _CHANGE_OF_PART, _CHANGE_AT_BORDER = 0.02, 0.1, 0.15
+# filter's center, which is larger where the first box held a part of the target.
+_DRAWN, _FOUND, _FOUND_OF_PART = 0.08, 0.04, 0.1
+# The change of a side from one frame to the next, and what comes to it while a border of the image
+# cuts the target.
+_CHANGE, _CHANGE_AT_BORDER = 0.02, 0.15
 _DRAWN_PIXELS = 0.7
 _BORDER_PIXELS = 1.5
-# In deviations: what a measurement differs from the box of the start without telling of a change,
-# since a person has drawn that after a convention of his own.
-_CONVENTION = 0.5
+# What a measurement differs from the expectation without telling of a change, in squared
+# deviations over sides: a person has drawn the first box after a convention of his own, and the
+# less sure a measurement is, the more of its error is the same in every frame.
+_CONVENTION = 8.0
 _SMALLEST_SIDE = 2.0
 
 
@@ -63,7 +64,7 @@ class EdgeFilter:
         self._limits = np.array(image_size, np.float64)
         # A box that the border cuts says nothing of what will be drawn around the whole.
         cut = bool(self._at_border(_edges(box)).any())
-        self._convention, self._change = (0.0, _CHANGE_OF_PART) if cut else (_CONVENTION, _CHANGE)
+        self._convention, self._found = (0.0, _FOUND_OF_PART) if cut else (_CONVENTION, _FOUND)
         error = (_DRAWN * _side(box))**2 + _DRAWN_PIXELS**2
         self._covariances = np.tile(np.diag([error, error]), (2, 1, 1))
 
@@ -81,12 +82,12 @@ class EdgeFilter:
         """
         edges, side = _edges(box), _side(box)
         at_border = self._at_border(edges) | self._at_border(measured.edges)
-        found = np.where(at_border, 2, 1) * (_FOUND * side)**2
-        change = (np.where(at_border, _CHANGE_AT_BORDER**2, 0) + self._change**2) * side**2
+        found = np.where(at_border, 2, 1) * (self._found * side)**2
+        change = (np.where(at_border, _CHANGE_AT_BORDER**2, 0) + _CHANGE**2) * side**2
         size = size_variance(self._covariances) + change
         predicted = _predicted(found, size)
-        differing = self._differing(measured.edges - edges, measured.deviations)
         noise = measured.deviations**2
+        differing = _beyond(measured.edges - edges, self._convention * noise / side)
         gain = predicted @ np.linalg.inv(predicted + noise[:, :, None] * np.eye(2))
         fused = edges + (gain @ differing[:, :, None])[:, :, 0]
         self._covariances = predicted - gain @ predicted
@@ -106,10 +107,10 @@ class EdgeFilter:
         return ((edges[:, 0] < _BORDER_PIXELS)
                 | (edges[:, 1] > self._limits - _BORDER_PIXELS))
 
-    def _differing(self, difference: _Array, deviations: _Array) -> _Array:
-        """Return what is left of a difference beyond that of conventions."""
-        spared = self._convention * deviations
-        return np.sign(difference) * np.maximum(0.0, np.abs(difference) - spared)
+
+def _beyond(difference: _Array, spared: _Array) -> _Array:
+    """Return what is left of a difference when so much of it is taken away."""
+    return np.sign(difference) * np.maximum(0.0, np.abs(difference) - spared)
 
 
 def size_variance(covariances: _Array) -> _Array:

@@ -52,14 +52,14 @@ def test_fusion_is_the_dense_kalman_update():
     blocks = []
     for _ in range(2):
         size = 2 * drawn + (0.02 * side)**2
-        center = (0.08 * side)**2
+        center = (0.04 * side)**2
         map_to_edges = np.array([[1, -0.5], [1, 0.5]])
         blocks.append(map_to_edges @ np.diag([center, size]) @ map_to_edges.T)
     prior = np.block([[blocks[0], np.zeros((2, 2))], [np.zeros((2, 2)), blocks[1]]])
     noise = np.diag(deviations.ravel()**2)
     expected = np.array([100.0, 140, 80, 110])
     difference = np.array([90.0, 150, 85, 105]) - expected
-    convention = 0.5 * deviations.ravel()
+    convention = 8 * deviations.ravel()**2 / side
     difference = np.sign(difference) * np.maximum(0, abs(difference) - convention)
     gain = prior @ np.linalg.inv(prior + noise)
     right = expected + gain @ difference
@@ -87,7 +87,7 @@ def test_unsure_measurements_leave_the_size():
 
 def test_what_a_convention_explains_is_no_change():
     """A box that was drawn with a margin keeps it."""
-    tight = BoundingBox(100.4, 80.4, 39.2, 29.2)
+    tight = BoundingBox(100.2, 80.2, 39.6, 29.6)
     box, _ = run(BOX, tight, 1.0, frames=100)
     assert box.as_tuple() == pytest.approx(BOX.as_tuple())
 

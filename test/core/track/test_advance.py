@@ -190,7 +190,7 @@ def test_what_is_not_believable_is_searched_elsewhere_and_that_is_judged(parts, 
     assert parts.redetection.call_args_list == [call(
         Outlook(FrameView(shown.image, RANGE), START, AHEAD), HERE, 7, after_shutter=False)]
     parts.monitor.judge.assert_called_once_with(THERE.assessment)
-    parts.detector.remember.assert_called_once_with(THERE.detection, result.box.center)
+    parts.detector.remember.assert_called_once_with(THERE.detection, pytest.approx((20, 60)))
     assert result.box.center == pytest.approx(THERE.detection.center)
 
 
@@ -329,11 +329,12 @@ def test_size_is_searched_and_then_measured(parts):
     assert result.box.center == pytest.approx((52, 36)) and result.box.size == (24, 12)
 
 
-def test_box_follows_the_measurement_and_so_does_the_sample(parts, track):
+def test_box_follows_the_measurement_and_the_sample_a_part_of_the_way(parts, track):
     parts.extent.side_effect = lambda box, measured: box.moved_to((57, 31))
     result = advance(track, frame())
     assert result.box.center == pytest.approx((57, 31))
-    parts.detector.remember.assert_called_once_with(HERE.detection, pytest.approx((57, 31)))
+    parts.detector.remember.assert_called_once_with(
+        HERE.detection, pytest.approx((53.5, 34.5)))
     parts.prediction.seen.assert_called_once_with(pytest.approx((57, 31)))
 
 
