@@ -107,7 +107,7 @@ def test_constants_of_the_fusion_are_those_of_the_code():
     told = {name: float(value) for name, value, *_ in rows(PAGE, 'name | value')}
     assert told == {
         'drawn': fusion._DRAWN, 'drawn pixels': fusion._DRAWN_PIXELS, 'found': fusion._FOUND,
-        'found of a part': fusion._FOUND_OF_PART, 'change': fusion._CHANGE,
+        'change': fusion._CHANGE,
         'border': fusion._CHANGE_AT_BORDER, 'convention': fusion._CONVENTION}
     assert f'{fusion._BORDER_PIXELS} pixels away' in PAGE
     assert f'{track._ANCHORING:.1g}'.lstrip('0') + ' of the way' in PAGE

@@ -33,8 +33,8 @@ __all__ = ['EdgeFilter']
 _Array = npt.NDArray[np.float64]
 
 # In sides of the target: the error of a box that a person draws, and that of the correlation
-# filter's center, which is larger where the first box held a part of the target.
-_DRAWN, _FOUND, _FOUND_OF_PART = 0.08, 0.04, 0.1
+# filter's center.
+_DRAWN, _FOUND = 0.08, 0.08
 # The change of a side from one frame to the next, and what comes to it while a border of the image
 # cuts the target.
 _CHANGE, _CHANGE_AT_BORDER = 0.02, 0.15
@@ -64,7 +64,7 @@ class EdgeFilter:
         self._limits = np.array(image_size, np.float64)
         # A box that the border cuts says nothing of what will be drawn around the whole.
         cut = bool(self._at_border(_edges(box)).any())
-        self._convention, self._found = (0.0, _FOUND_OF_PART) if cut else (_CONVENTION, _FOUND)
+        self._convention = 0.0 if cut else _CONVENTION
         error = (_DRAWN * _side(box))**2 + _DRAWN_PIXELS**2
         self._covariances = np.tile(np.diag([error, error]), (2, 1, 1))
 
@@ -82,7 +82,7 @@ class EdgeFilter:
         """
         edges, side = _edges(box), _side(box)
         at_border = self._at_border(edges) | self._at_border(measured.edges)
-        found = np.where(at_border, 2, 1) * (self._found * side)**2
+        found = np.where(at_border, 2, 1) * (_FOUND * side)**2
         change = (np.where(at_border, _CHANGE_AT_BORDER**2, 0) + _CHANGE**2) * side**2
         size = size_variance(self._covariances) + change
         predicted = _predicted(found, size)

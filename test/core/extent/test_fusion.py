@@ -52,7 +52,7 @@ def test_fusion_is_the_dense_kalman_update():
     blocks = []
     for _ in range(2):
         size = 2 * drawn + (0.02 * side)**2
-        center = (0.04 * side)**2
+        center = (0.08 * side)**2
         map_to_edges = np.array([[1, -0.5], [1, 0.5]])
         blocks.append(map_to_edges @ np.diag([center, size]) @ map_to_edges.T)
     prior = np.block([[blocks[0], np.zeros((2, 2))], [np.zeros((2, 2)), blocks[1]]])
