@@ -18,7 +18,8 @@ The probability that a detection is the target, from all that speaks for it.
 A logistic regression, fitted by `python -m training.trust --data DATA --rendered FOLDER` on clips
 of the train part and rendered sequences that the extent network never saw, as they are and under
 challenges, on detections that overlap the target by more than a half or not at all. The former
-weigh nine times as much as the latter, as while a target is followed: a score of 0.5 is rather a sign of its absence.
+weigh nine times as much as the latter, as while a target is followed: a score of 0.5 is rather a
+sign of its absence.
 """
 
 from __future__ import annotations
