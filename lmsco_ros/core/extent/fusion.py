@@ -84,7 +84,7 @@ class EdgeFilter:
         at_border = self._at_border(edges) | self._at_border(measured.edges)
         found = np.where(at_border, 2, 1) * (_FOUND * side)**2
         change = (np.where(at_border, _CHANGE_AT_BORDER**2, 0) + _CHANGE**2) * side**2
-        size = size_variance(self._covariances) + change
+        size = _size_variance(self._covariances) + change
         predicted = _predicted(found, size)
         noise = measured.deviations**2
         differing = _beyond(measured.edges - edges, self._convention * noise / side)
@@ -92,15 +92,6 @@ class EdgeFilter:
         fused = edges + (gain @ differing[:, :, None])[:, :, 0]
         self._covariances = predicted - gain @ predicted
         return _box(fused)
-
-    @property
-    def covariance(self) -> _Array:
-        """Covariance of center x, center y, width and height in px^2, shape (4, 4)."""
-        result = np.zeros((4, 4))
-        for axis, part in enumerate(self._covariances):
-            change = np.array([[0.5, 0.5], [-1.0, 1.0]])
-            result[axis::2, axis::2] = change @ part @ change.T
-        return result
 
     def _at_border(self, edges: _Array) -> npt.NDArray[np.bool_]:
         """Return along which axes edges (2, 2) lie at the border of the image, or beyond it."""
@@ -113,7 +104,7 @@ def _beyond(difference: _Array, spared: _Array) -> _Array:
     return np.sign(difference) * np.maximum(0.0, np.abs(difference) - spared)
 
 
-def size_variance(covariances: _Array) -> _Array:
+def _size_variance(covariances: _Array) -> _Array:
     """Return the variances of the distance of two edges, from covariances (2, 2, 2) of both."""
     return covariances[:, 0, 0] + covariances[:, 1, 1] - 2 * covariances[:, 0, 1]
 
