@@ -45,7 +45,9 @@ __all__ = ['Track']
 # How much of the way from its own place to the fused center the filter learns to go: all of it
 # would lead it away with a neighbor that was measured by mistake, nothing would leave it on the
 # part of the target that came into view first.
-_ANCHORING = 0.3
+# Deviation of the measured edges, in sides of the target, with which the filter goes half of the
+# way from its own center to the fused one.
+_ANCHORING = 0.2
 
 
 class Track:
@@ -145,7 +147,7 @@ class Track:
         else:
             self._prediction.missed()
         if verdict.learns:
-            self._learn(sighting.detection)
+            self._learn(sighting)
         self._detector.watch(view, self._expected(view))
         self.result = self._describe(view, sighting.detection, verdict.score, verdict.state)
         return self.result
@@ -192,13 +194,20 @@ class Track:
         if state is TrackState.TRACKING and self._config.presence.distractors:
             self._observer.keep(view, box)
 
-    def _learn(self, detection: Detection) -> None:
+    def _learn(self, sighting: Sighting) -> None:
         """Store the sample; when it is time, train the filter."""
-        (x, y), (fused_x, fused_y) = detection.center, self._box.center
-        self._detector.remember(detection, (
-            x + _ANCHORING * (fused_x - x), y + _ANCHORING * (fused_y - y)))
+        self._detector.remember(sighting.detection, self._anchor(sighting))
         if self._frame % self._config.learning.update_interval == 0:
             self._detector.train()
+
+    def _anchor(self, sighting: Sighting) -> tuple[float, float]:
+        """Return the place (x, y) to learn: between the found and the fused one, if that is sure."""
+        (x, y), (fused_x, fused_y) = sighting.detection.center, self._box.center
+        if sighting.measurement is None:
+            return x, y
+        unsure = sighting.measurement.deviations.mean(axis=1) / self._box.area**0.5
+        right, down = (1 / (1 + (unsure / _ANCHORING)**2)).tolist()
+        return x + right * (fused_x - x), y + down * (fused_y - y)
 
     def _describe(self, view: FrameView, detection: Detection, score: float,
                   state: TrackState) -> TrackResult:

@@ -108,9 +108,9 @@ def test_constants_of_the_fusion_are_those_of_the_code():
     assert told == {
         'drawn': fusion._DRAWN, 'drawn pixels': fusion._DRAWN_PIXELS, 'found': fusion._FOUND,
         'change': fusion._CHANGE,
-        'border': fusion._CHANGE_AT_BORDER, 'convention': fusion._CONVENTION}
+        'border': fusion._CHANGE_AT_BORDER, 'convention': fusion._CONVENTION,
+        'settling': fusion._SETTLING, 'anchoring': track._ANCHORING}
     assert f'{fusion._BORDER_PIXELS} pixels away' in PAGE
-    assert f'{track._ANCHORING:.1g}'.lstrip('0') + ' of the way' in PAGE
     assert f'at least {fusion._SMALLEST_SIDE:g} pixels' in PAGE
 
 

@@ -32,7 +32,7 @@ __all__ = ['Bodies', 'PLANS', 'chosen_of', 'draw', 'edges', 'posed', 'sample_bod
 PARTS = 8
 
 # Of each part: middle (x, y), radii (a, b), turn in degrees, heat. Heights are about 2, y goes
-# down. What is colder than _COUNTED is no part of the extent: a tail, a rotor.
+# down. What is planned colder than _COUNTED is no part of the extent: a tail, a rotor.
 PLANS: dict[str, tuple[tuple[float, ...], ...]] = {
     'walker': ((0, -.84, .13, .15, 0, 1.1), (0, -.35, .21, .37, 0, 1), (-.08, .2, .12, .3, 8, .9),
                (-.13, .7, .08, .3, 6, .8), (.08, .2, .12, .3, -8, .9), (.13, .7, .08, .3, -6, .8),
@@ -78,6 +78,8 @@ class Bodies:
         Whether the exponents p of the superellipses are 4, not 2.
     heat : tensor, shape (n, PARTS)
         Contrast to the background.
+    counted : tensor, shape (n, PARTS), bool
+        Which parts belong to the extent.
 
     """
 
@@ -86,6 +88,7 @@ class Bodies:
     turns: torch.Tensor
     boxy: torch.Tensor
     heat: torch.Tensor
+    counted: torch.Tensor
 
     @property
     def there(self) -> torch.Tensor:
@@ -105,22 +108,37 @@ def sample_bodies(count: int, device: torch.device) -> Bodies:
     middles = torch.where(free[..., None], scatter, parts[..., :2])
     radii = parts[..., 2:4] * torch.exp(0.25 * torch.randn(count, PARTS, 2, device=device))
     turns = parts[..., 4] + free * math.pi * torch.rand(count, PARTS, device=device)
-    cold = parts[..., 5] < _COUNTED
-    # Some are evenly warm, of others one part outshines the rest: a face, an engine.
-    spread = 0.45 * torch.rand(count, 1, device=device)
-    heat = parts[..., 5] * torch.exp(spread * torch.randn(count, PARTS, device=device))
-    hot = torch.arange(PARTS, device=device) == torch.randint(PARTS, (count, 1), device=device)
-    hot = hot & _chance(0.4, count, device)[:, None]
-    heat = heat.clamp(min=1.1 * _COUNTED) * torch.where(
-        hot, 1 + 1.5 * torch.rand(count, 1, device=device), 1.0)
-    heat = torch.where(cold, parts[..., 5] * torch.rand(count, PARTS, device=device), heat)
-    return posed(Bodies(middles, radii, turns, boxy[kinds], heat),
+    counted = parts[..., 5] >= _COUNTED
+    heat = torch.where(counted, _warmth(parts[..., 5]),
+                       parts[..., 5] * torch.rand(count, PARTS, device=device))
+    return posed(Bodies(middles, radii, turns, boxy[kinds], heat, counted),
                  torch.full((count,), 0.05, device=device))
+
+
+def _warmth(planned: torch.Tensor) -> torch.Tensor:
+    """
+    Return the heat of parts, shape (n, PARTS), from the planned one.
+
+    Some bodies are evenly warm; of others one part outshines the rest: an engine, or the warmest
+    one, a face; and some are clothed: any part may be as cold as what is behind, or colder.
+    """
+    count, device = len(planned), planned.device
+    spread = 0.45 * torch.rand(count, 1, device=device)
+    heat = (planned * torch.exp(spread * torch.randn_like(planned))).clamp(min=1.1 * _COUNTED)
+    some = torch.randint(PARTS, (count, 1), device=device)
+    chosen = torch.where(_chance(0.5, count, device)[:, None], some,
+                         planned.argmax(dim=1, keepdim=True))
+    one = torch.arange(PARTS, device=device) == chosen
+    kind = torch.rand(count, 1, device=device)
+    hot = heat * torch.where(one, 1 + 2 * torch.rand(count, 1, device=device),
+                             1 - 0.5 * torch.rand(count, 1, device=device))
+    clothed = torch.where(one, 1.0, 1.6 * torch.rand_like(heat) - 0.4)
+    return torch.where(kind < 0.4, hot, torch.where(kind > 0.75, clothed, heat))
 
 
 def posed(bodies: Bodies, amount: torch.Tensor) -> Bodies:
     """
-    Return bodies in another pose: parts moved, turned, stretched.
+    Return bodies in another pose: parts moved, turned, stretched, and as warm as seen from there.
 
     Parameters
     ----------
@@ -134,7 +152,8 @@ def posed(bodies: Bodies, amount: torch.Tensor) -> Bodies:
     return replace(
         bodies, middles=bodies.middles + spread * torch.randn_like(bodies.middles),
         radii=bodies.radii * torch.exp(2 * spread * torch.randn_like(bodies.radii)),
-        turns=bodies.turns + 4 * spread[..., 0] * torch.randn_like(bodies.turns))
+        turns=bodies.turns + 4 * spread[..., 0] * torch.randn_like(bodies.turns),
+        heat=bodies.heat * torch.exp(2 * spread[..., 0] * torch.randn_like(bodies.heat)))
 
 
 def transformed(bodies: Bodies, turn: torch.Tensor, stretch: torch.Tensor,
@@ -181,7 +200,7 @@ def edges(bodies: Bodies) -> torch.Tensor:
     cosine, sine = torch.cos(bodies.turns).abs(), torch.sin(bodies.turns).abs()
     along = torch.stack([torch.stack([cosine, sine], -1), torch.stack([sine, cosine], -1)], -2)
     reach = (bodies.radii[:, :, None] * along).pow(dual[..., None]).sum(-1).pow(1 / dual)
-    counted = (bodies.there & (bodies.heat >= _COUNTED))[..., None]
+    counted = (bodies.there & bodies.counted)[..., None]
     low = torch.where(counted, bodies.middles - reach, math.inf).amin(dim=1)
     high = torch.where(counted, bodies.middles + reach, -math.inf).amax(dim=1)
     return torch.cat([low, high], dim=1)

@@ -233,7 +233,8 @@ def _expected(first: torch.Tensor, now: torch.Tensor, present: torch.Tensor,
 
     They are off by more than those of a tracker that goes well: otherwise the network would learn
     to trust them, and its answers would tell nothing new. Some expect the size of the first
-    frame; of what had entered by a part then, that part. Some look beside the target.
+    frame; of what had entered by a part then, that part, or more of it. Some look beside the
+    target.
     """
     count, device = len(first), first.device
     wrong = 0.1 * 4.0**torch.rand(count, 1, device=device)
@@ -244,9 +245,11 @@ def _expected(first: torch.Tensor, now: torch.Tensor, present: torch.Tensor,
     size = torch.where(as_first, first[:, 2:] - first[:, :2], size)
     side = _side(now)[:, None]
     shift = (0.6 * wrong * torch.randn(count, 2, device=device)).clamp(-0.35, 0.35) * side
-    part = (entered & (torch.rand(count, device=device) < 0.5))[:, None]
-    size = torch.where(part, torch.minimum(first[:, 2:] - first[:, :2], now[:, 2:] - now[:, :2]),
-                       size)
+    part = (entered & (torch.rand(count, device=device) < 0.6))[:, None]
+    whole = now[:, 2:] - now[:, :2]
+    held = torch.minimum(first[:, 2:] - first[:, :2], whole)
+    known = torch.rand(count, 1, device=device).square()
+    size = torch.where(part, held * (whole / held)**known, size)
     room = (now[:, 2:] - now[:, :2] - size).clamp(min=0)
     shift = torch.where(part, room * (torch.rand(count, 2, device=device) - 0.5), shift)
     angle = 2 * math.pi * torch.rand(count, 1, device=device)

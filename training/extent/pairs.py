@@ -85,7 +85,9 @@ class RenderedPairs:
         side = _SMALLEST * (_LARGEST / _SMALLEST)**torch.rand(count, device=device)
         one = _seen(bodies, 0.1, device)
         unit = side / _side(edges(one))
-        two = _seen(posed(bodies, 0.08 * torch.rand(count, device=device)), 0.12, device)
+        bent = 0.08 * torch.rand(count, device=device)
+        bent = torch.where(torch.rand(count, device=device) < 0.25, 2.5 * bent, bent)
+        two = _seen(posed(bodies, bent), 0.12, device)
         growth = torch.exp(0.4 * torch.randn(count, device=device))
         scales = torch.stack([unit, unit * growth], dim=1)
         places = SIDE / 2 + 0.1 * SIDE * (torch.rand(count, 2, 2, device=device) - 0.5)
@@ -96,7 +98,7 @@ class RenderedPairs:
         fate = torch.rand(count, device=device)
         pictures, contrast = self._backgrounds(count), _contrasts(count, device)
         for _ in range(2):
-            pictures = self._beside(pictures, bodies, boxes, contrast)
+            pictures = _with_another(pictures, bodies, boxes, contrast, 0.5)
         softness = 0.4 + 1.2 * torch.rand(count, device=device)
         shades = self._shades(count)
         first = _painted(pictures[:, 0], draw(one, origins[:, 0], scales[:, 0], softness, SIDE),
@@ -108,9 +110,10 @@ class RenderedPairs:
         cover, heat = draw(two, origins[:, 1], scales[:, 1], softness, SIDE)
         cover = cover * ((fate < 0.1) | (fate >= 0.2))[:, None, None]
         later = _painted(pictures[:, 1], (cover, heat), contrast, shades)
+        pictures = _with_another(torch.stack([first, later], 1), bodies, boxes, contrast, 0.15)
+        pictures = _behind_bars(pictures, boxes, torch.tensor([0.1, 0.3], device=device))
         bounds = torch.tensor([0.0, 0, SIDE, SIDE], device=device).expand(count, 2, 4)
-        return Pairs(torch.stack([first, later], 1), boxes, bounds,
-                     torch.ones(count, 2, device=device), fate >= 0.2)
+        return Pairs(pictures, boxes, bounds, torch.ones(count, 2, device=device), fate >= 0.2)
 
     def _backgrounds(self, count: int) -> torch.Tensor:
         """Return backgrounds of both frames, (n, 2, SIDE, SIDE), of unit contrast at most."""
@@ -126,42 +129,14 @@ class RenderedPairs:
         seen = seen / (seen.std(dim=(1, 2, 3), keepdim=True) + 0.02)
         strength = 1.2 * torch.rand(count, device=device)**1.5 * (
             torch.rand(count, device=device) < 0.85)
+        # A town is as warm as those who walk in it.
+        strength = torch.where(torch.rand(count, device=device) < 0.15, 2.5 * strength, strength)
         slope = torch.randn(count, 2, device=device) / SIDE
         axis = torch.arange(SIDE, device=device) - SIDE / 2
         ramp = (slope[:, 0, None, None] * axis[None, None]
                 + slope[:, 1, None, None] * axis[None, :, None])
         smooth = blurred(seen, 3.0 * torch.rand(count, device=device))
         return smooth * strength[:, None, None, None] + ramp[:, None]
-
-    def _beside(self, pictures: torch.Tensor, targets: Bodies, boxes: torch.Tensor,
-                contrast: torch.Tensor) -> torch.Tensor:
-        """
-        Return pictures with another body beside the target, about as warm, in one half.
-
-        Half of the others are of its kind, as in a crowd: they stand nearer, and touch it.
-        """
-        count, device = len(pictures), pictures.device
-        alike = torch.rand(count, device=device) < 0.5
-        bodies = chosen_of(alike, posed(targets, torch.full((count,), 0.06, device=device)),
-                           sample_bodies(count, device))
-        there = torch.rand(count, device=device) < 0.5
-        side = _side(boxes[:, 0])
-        angle = 2 * math.pi * torch.rand(count, device=device)
-        nearest = torch.where(alike, 0.45, 0.75)
-        reach = (nearest + 1.5 * torch.rand(count, device=device).square()) * side
-        unit = side * torch.exp(0.3 * torch.randn(count, device=device)) / _side(edges(bodies))
-        kind = contrast * torch.exp(torch.where(alike, 0.15, 0.4) * torch.randn(
-            count, device=device))
-        result = []
-        for k in range(2):
-            middle = (boxes[:, k, :2] + boxes[:, k, 2:]) / 2
-            away = torch.stack([torch.cos(angle), torch.sin(angle)], 1) * reach[:, None]
-            angle = angle + 0.4 * torch.randn(count, device=device)
-            cover, heat = draw(_seen(bodies, 0.1, device), middle + away, unit,
-                               torch.full_like(unit, 0.8), SIDE)
-            result.append(_painted(pictures[:, k], (cover * there[:, None, None], heat), kind,
-                                   torch.zeros_like(cover)))
-        return torch.stack(result, dim=1)
 
     def _shades(self, count: int) -> torch.Tensor:
         """Return the texture of bodies, shape (n, SIDE, SIDE)."""
@@ -337,6 +312,61 @@ def erased(images: torch.Tensor, box: torch.Tensor) -> torch.Tensor:
     beside = warped(images, zeros, torch.ones(count, 2, device=device), away * size)
     mask = soft_box(box, 1.2, 0.3)[:, None]
     return images + mask * (beside - images)
+
+
+def _with_another(pictures: torch.Tensor, targets: Bodies, boxes: torch.Tensor,
+                  contrast: torch.Tensor, chance: float) -> torch.Tensor:
+    """
+    Return pictures (n, 2, SIDE, SIDE) with another body in front, by chance, beside the target.
+
+    It is about as warm; half of the others are of the kind of the target, as in a crowd: they
+    stand nearer, and touch it.
+    """
+    count, device = len(pictures), pictures.device
+    alike = torch.rand(count, device=device) < 0.5
+    bodies = chosen_of(alike, posed(targets, torch.full((count,), 0.06, device=device)),
+                       sample_bodies(count, device))
+    there = torch.rand(count, device=device) < chance
+    side = _side(boxes[:, 0])
+    angle = 2 * math.pi * torch.rand(count, device=device)
+    nearest = torch.where(alike, 0.45, 0.75)
+    reach = (nearest + 1.5 * torch.rand(count, device=device).square()) * side
+    unit = side * torch.exp(0.3 * torch.randn(count, device=device)) / _side(edges(bodies))
+    kind = contrast * torch.exp(torch.where(alike, 0.15, 0.4) * torch.randn(count, device=device))
+    result = []
+    for k in range(2):
+        middle = (boxes[:, k, :2] + boxes[:, k, 2:]) / 2
+        away = torch.stack([torch.cos(angle), torch.sin(angle)], 1) * reach[:, None]
+        angle = angle + 0.4 * torch.randn(count, device=device)
+        cover, heat = draw(_seen(bodies, 0.1, device), middle + away, unit,
+                           torch.full_like(unit, 0.8), SIDE)
+        result.append(_painted(pictures[:, k], (cover * there[:, None, None], heat), kind,
+                               torch.zeros_like(cover)))
+    return torch.stack(result, dim=1)
+
+
+def _behind_bars(pictures: torch.Tensor, boxes: torch.Tensor,
+                 chances: torch.Tensor) -> torch.Tensor:
+    """Return pictures with bars in front of some targets: branches, rails, posts."""
+    count, device = len(pictures), pictures.device
+    axis = torch.arange(SIDE, device=device) + 0.5
+    hidden = torch.rand(count, 2, device=device) < chances
+    side = _side(boxes.flatten(0, 1)).view(count, 2)
+    middle = (boxes[..., :2] + boxes[..., 2:]) / 2
+    slant = math.pi * torch.rand(count, 1, device=device)
+    level = pictures.mean(dim=(2, 3)) + 0.5 * pictures.std(dim=(2, 3)) * torch.randn(
+        count, 1, device=device)
+    for _ in range(3):
+        angle = slant + 0.1 * torch.randn(count, 2, device=device)
+        offset = 0.6 * side * torch.randn(count, 2, device=device)
+        half = 0.5 * side * (0.03 + 0.25 * torch.rand(count, 2, device=device).square())
+        x, y = (axis - middle[..., i, None] for i in range(2))
+        away = (torch.cos(angle)[..., None] * x)[:, :, None] + (
+            torch.sin(angle)[..., None] * y)[..., None] - offset[..., None, None]
+        cover = torch.sigmoid(4 * (half[..., None, None] - away.abs()))
+        cover = cover * hidden[..., None, None]
+        pictures = pictures + cover * (level[..., None, None] - pictures)
+    return pictures
 
 
 def _seen(bodies: Bodies, stretch: float, device: torch.device) -> Bodies:

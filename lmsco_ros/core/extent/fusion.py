@@ -44,6 +44,8 @@ _BORDER_PIXELS = 1.5
 # deviations over sides: a person has drawn the first box after a convention of his own, and the
 # less sure a measurement is, the more of its error is the same in every frame.
 _CONVENTION = 8.0
+# Frames in which the whole of a target that came in over the border shows how that is drawn.
+_SETTLING = 40
 _SMALLEST_SIDE = 2.0
 
 
@@ -64,7 +66,7 @@ class EdgeFilter:
         self._limits = np.array(image_size, np.float64)
         # A box that the border cuts says nothing of what will be drawn around the whole.
         cut = bool(self._at_border(_edges(box)).any())
-        self._convention = 0.0 if cut else _CONVENTION
+        self._whole = 0 if cut else _SETTLING
         error = (_DRAWN * _side(box))**2 + _DRAWN_PIXELS**2
         self._covariances = np.tile(np.diag([error, error]), (2, 1, 1))
 
@@ -86,8 +88,10 @@ class EdgeFilter:
         change = (np.where(at_border, _CHANGE_AT_BORDER**2, 0) + _CHANGE**2) * side**2
         size = _size_variance(self._covariances) + change
         predicted = _predicted(found, size)
+        self._whole += not at_border.any()
         noise = measured.deviations**2
-        differing = _beyond(measured.edges - edges, self._convention * noise / side)
+        convention = _CONVENTION * min(1.0, self._whole / _SETTLING)
+        differing = _beyond(measured.edges - edges, convention * noise / side)
         gain = predicted @ np.linalg.inv(predicted + noise[:, :, None] * np.eye(2))
         fused = edges + (gain @ differing[:, :, None])[:, :, 0]
         self._covariances = predicted - gain @ predicted

@@ -34,7 +34,8 @@ __all__ = ['extent_at']
 _SMALLEST, _RATIO, _LARGEST_PART = 8.0, 2**0.5, 0.7
 _ROUNDS = 3
 # Log-odds that a deviation as large as the target itself takes away.
-_DOUBT = 6.0
+_DOUBT = 25.0
+_LEAST_WORTH = -8.0
 
 
 def extent_at(network: ExtentNet, view: FrameView, point: Sequence[float]) -> BoundingBox:
@@ -65,7 +66,7 @@ def extent_at(network: ExtentNet, view: FrameView, point: Sequence[float]) -> Bo
         measured := _settled(meter, view, BoundingBox.from_center(place, (side, side)))
     ).box.contains(place)]
     best = max(found, key=_worth, default=None)
-    if best is None or _worth(best) < 0:
+    if best is None or _worth(best) < _LEAST_WORTH:
         raise PointError(f'nothing stands out from its surroundings at {place}; expected a '
                          'target that is warmer or colder: point at its middle, or give its box')
     return visible_part(best.box, view.size)

@@ -97,6 +97,17 @@ def test_box_that_the_border_cuts_has_no_convention():
     assert box.as_tuple() == pytest.approx(whole.as_tuple(), abs=0.05)
 
 
+def test_target_that_came_in_gets_a_convention_when_it_has_settled():
+    entered, larger = BoundingBox(60, 80, 30, 28), BoundingBox(59.8, 79.8, 30.4, 28.4)
+    changes = []
+    for frames in (1, 40):
+        fuse = EdgeFilter(BoundingBox(0, 80, 8, 20), IMAGE)
+        for _ in range(frames):
+            fuse(entered, measured(entered, 1.0))
+        changes.append(fuse(entered, measured(larger, 1.0)).width - entered.width)
+    assert changes[0] > 0.05 and changes[1] == pytest.approx(0, abs=1e-9)
+
+
 def test_size_at_the_border_changes_faster():
     near, far = BoundingBox(0, 80, 40, 30), BoundingBox(60, 80, 40, 30)
     changes = []

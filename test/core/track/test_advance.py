@@ -333,8 +333,9 @@ def test_box_follows_the_measurement_and_the_sample_a_part_of_the_way(parts, tra
     parts.extent.side_effect = lambda box, measured: box.moved_to((57, 31))
     result = advance(track, frame())
     assert result.box.center == pytest.approx((57, 31))
+    # Edges that are sure to 1 of 14.1 pixels: 1 / (1 + (1 / 14.1 / .2)^2) of the way is learned.
     parts.detector.remember.assert_called_once_with(
-        HERE.detection, pytest.approx((53.5, 34.5)))
+        HERE.detection, pytest.approx((52 + 5 / 1.125, 36 - 5 / 1.125)))
     parts.prediction.seen.assert_called_once_with(pytest.approx((57, 31)))
 
 
@@ -342,6 +343,16 @@ def test_size_is_kept_where_nothing_is_measured(parts, track):
     parts.observer.look.return_value = Seen(replace(HERE, measurement=None))
     assert advance(track, frame()).box.size == START.size
     parts.extent.assert_not_called()
+    parts.detector.remember.assert_called_once_with(HERE.detection, HERE.detection.center)
+
+
+def test_what_is_learned_hardly_moves_to_a_center_that_is_unsure(parts, track):
+    unsure = replace(HERE.measurement, deviations=np.full((2, 2), 20.0))
+    parts.observer.look.return_value = Seen(replace(HERE, measurement=unsure))
+    parts.extent.side_effect = lambda box, measured: box.moved_to((57, 31))
+    advance(track, frame())
+    x, y = parts.detector.remember.call_args.args[1]
+    assert 52 < x < 52.2 and 35.8 < y < 36
 
 
 @pytest.mark.parametrize('factor', [1e4, 1e-4])
