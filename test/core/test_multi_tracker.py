@@ -176,12 +176,24 @@ def test_frame_is_measured_once_for_all(scene, monkeypatch):
     survey = targets_module.survey
     monkeypatch.setattr(targets_module, 'survey', lambda image, config: (
         measured.append(image), survey(image, config))[1])
-    tracker = MultiTracker('hcs')
-    for center in paths(0):
+    tracker = MultiTracker()
+    for count, center in enumerate(paths(0), 1):
         tracker.initialize(frame(scene, *paths(0)), box_of(center))
-    measured.clear()
+        assert len(measured) == count
     tracker.update(frame(scene, *paths(1)))
-    assert len(measured) == 1
+    assert len(measured) == 4
+    # Where a point is, the box is found in what was measured.
+    tracker.initialize_at(frame(scene, *paths(1)), paths(1)[0])
+    assert len(measured) == 5
+
+
+def test_frame_that_does_not_fit_is_refused_before_a_point_is_looked_at(scene):
+    tracker, image = MultiTracker(), frame(scene, *paths(0))
+    tracker.initialize(image, box_of(paths(0)[0]), 1.0)
+    for wrong, time, error in ((image[:120], 2.0, ImageError), (image, None, TimeError)):
+        with pytest.raises(error):
+            tracker.initialize_at(wrong, (-1, -1), time)
+    assert tracker.ids == (1,)
 
 
 def test_late_target_catches_up_alone(scene):
