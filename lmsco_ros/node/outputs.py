@@ -71,6 +71,7 @@ class Outputs:
         self._node = node
         self._display_range = DisplayRange()
         self._frames = 0
+        self._outlined: set[int] = set()
         with contextlib.ExitStack() as made:
             self._box = self._publisher(PolygonStamped, 'box', made)
             self._boxes = self._publisher(PolygonInstanceStamped, 'boxes', made)
@@ -114,7 +115,7 @@ class Outputs:
                 [Tracked(each.box.as_tuple(), str(number), each.score)
                  for number, each in found.items()], header))
         if _is_heard(self._marker):
-            self._marker.publish(self._outline(found.get(outcome.track_id), header))
+            self._publish_outlines(outcome, found, header)
         if result is not None and outcome.image is not None and _is_heard(self._confidence):
             self._confidence.publish(message_from_confidence(
                 result.confidence_map, result.search_region.as_tuple(),
@@ -144,13 +145,22 @@ class Outputs:
         from vision_msgs.msg import Detection2DArray
         return self._publisher(Detection2DArray, 'detections', made)
 
-    def _outline(self, found: TrackResult | None, header: Header) -> ImageMarker:
+    def _publish_outlines(self, outcome: Outcome, found: Mapping[int, TrackResult],
+                          header: Header) -> None:
+        """Outline every target that is seen, and take away the outlines of the others."""
+        # Of frames that one target goes through late nothing is said of the others.
+        asked = self._outlined if outcome.live else set(outcome.results)
+        gone = asked - set(found)
         namespace = self._node.get_name()
-        if found is None:
-            return marker_removal(namespace=namespace, header=header)
-        blue, green, red = (value / 255 for value in state_color(found.state))
-        return marker_from_box(found.box.as_tuple(), (red, green, blue), namespace=namespace,
-                               line_width=self.settings.marker_line_width, header=header)
+        for number in gone:
+            self._marker.publish(marker_removal(
+                namespace=namespace, marker_id=number, header=header))
+        for number, result in found.items():
+            blue, green, red = (value / 255 for value in state_color(result.state))
+            self._marker.publish(marker_from_box(
+                result.box.as_tuple(), (red, green, blue), namespace=namespace, marker_id=number,
+                line_width=self.settings.marker_line_width, header=header))
+        self._outlined = self._outlined - gone | set(found)
 
     def _readings(self, image: npt.NDArray | None, result: TrackResult) -> Readings:
         """Return what is counted under a box of the image that the tracker sees."""

@@ -22,11 +22,13 @@ import pytest
 from sensor_msgs.msg import Image, RegionOfInterest
 from std_msgs.msg import UInt32
 from std_srvs.srv import Trigger
+from visualization_msgs.msg import ImageMarker
 
 from lmsco_ros.core.errors import BoxError
 from lmsco_ros.core.types import TrackState
 from msg_adapters.boxes import box_from_polygon
 from msg_adapters.image import image_from_message
+from msg_adapters.markers import box_from_marker
 from msg_adapters.status import Level, statuses_from_message
 
 MARGIN = dict(crop_left=3, crop_top=2)
@@ -234,6 +236,41 @@ def test_overlay_tells_the_targets_apart(several):
     # Both boxes, and the numbers below them.
     assert all((drawn[15, x - 2:x + 3] != drawn[40, 60]).any() for x in (11, 31))
     assert all((drawn[20:30, x:x + 8] != drawn[40, 60]).any() for x in (11, 31))
+
+
+def outlines(markers, image):
+    """Return the boxes that the markers of an image draw, None where one is taken away."""
+    return {marker.id: box_from_marker(marker) for marker in markers
+            if marker.header == image.header}
+
+
+def test_every_target_has_a_marker_of_its_own(several):
+    running = several()
+    markers = running.graph.listen(ImageMarker, 'lmsco_tracker/marker')
+    image, lost, dropped = (running.graph.image() for _ in range(3))
+    running.send(image)
+    running.graph.spin_until(lambda: len(outlines(markers, image)) == 2)
+    assert outlines(markers, image) == {1: (11, 12, 8, 6), 2: (31, 12, 8, 6)}
+    running.fake.states = [TrackState.LOST, TrackState.TRACKING]
+    running.send(lost)
+    running.graph.spin_until(lambda: len(outlines(markers, lost)) == 2)
+    assert outlines(markers, lost) == {1: None, 2: (32, 12, 8, 6)}
+    assert {marker.ns for marker in markers} == {'lmsco_tracker'}
+    running.graph.call(Trigger, 'lmsco_tracker/reset')
+    running.send(dropped)
+    running.graph.spin_until(lambda: outlines(markers, dropped))
+    assert outlines(markers, dropped) == {2: None}
+
+
+def test_target_that_catches_up_leaves_the_markers_of_the_others(several):
+    running = several()
+    markers = running.graph.listen(ImageMarker, 'lmsco_tracker/marker')
+    first, second = (running.graph.image() for _ in range(2))
+    running.send(first, second)
+    stamp = first.header.stamp
+    running.start_stamped((50, 12, 8, 6), stamp.sec * 10 ** 9 + stamp.nanosec)
+    running.graph.spin_until(lambda: 3 in outlines(markers, second))
+    assert not [marker for marker in markers if box_from_marker(marker) is None]
 
 
 def test_detections_hold_all_targets(several, monkeypatch):
