@@ -45,6 +45,8 @@ from msg_adapters.image import message_from_image
 from msg_adapters.markers import marker_from_box, marker_removal
 from msg_adapters.status import FrameStatus, message_from_statuses
 
+# Messages that are kept for who cannot take them at once; so many for each target where one speaks
+# of one target.
 _DEPTH = 10
 
 
@@ -72,15 +74,16 @@ class Outputs:
         self._display_range = DisplayRange()
         self._frames = 0
         self._outlined: set[int] = set()
+        each = _DEPTH * settings.max_targets
         with contextlib.ExitStack() as made:
             self._box = self._publisher(PolygonStamped, 'box', made)
-            self._boxes = self._publisher(PolygonInstanceStamped, 'boxes', made)
-            self.states = StateOutputs(
-                lambda kind, name: self._publisher(kind, name, made), node.get_logger().warning)
+            self._boxes = self._publisher(PolygonInstanceStamped, 'boxes', made, each)
+            self.states = StateOutputs(lambda kind, name: self._publisher(
+                kind, name, made, each), node.get_logger().warning)
             self._status = self._publisher(DiagnosticArray, 'status', made)
             self._confidence = self._publisher(Image, 'confidence_map', made)
             self._overlay = self._publisher(Image, 'overlay', made)
-            self._marker = self._publisher(ImageMarker, 'marker', made)
+            self._marker = self._publisher(ImageMarker, 'marker', made, each)
             self._detections = self._detections_publisher(made)
             self._made = made.pop_all()
 
@@ -132,10 +135,10 @@ class Outputs:
         """Take the topics away."""
         self._made.close()
 
-    def _publisher(self, message_type: type, name: str,
-                   made: contextlib.ExitStack) -> LifecyclePublisher:
-        """Make a publisher that goes away with the others."""
-        publisher = self._node.create_lifecycle_publisher(message_type, f'~/{name}', _DEPTH)
+    def _publisher(self, message_type: type, name: str, made: contextlib.ExitStack,
+                   depth: int = _DEPTH) -> LifecyclePublisher:
+        """Make a publisher, which keeps so many messages, that goes away with the others."""
+        publisher = self._node.create_lifecycle_publisher(message_type, f'~/{name}', depth)
         made.callback(self._node.destroy_lifecycle_publisher, publisher)
         return publisher
 

@@ -31,9 +31,10 @@ from types import TracebackType
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray
-from geometry_msgs.msg import PolygonStamped
+from geometry_msgs.msg import PolygonInstanceStamped, PolygonStamped
 import rclpy
 from rclpy.context import Context
+from rclpy.exceptions import ParameterException
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.logging import LoggingSeverity, set_logger_level
@@ -51,8 +52,9 @@ from msg_adapters.boxes import polygon_from_box
 
 NODE_NAME = 'lmsco_tracker'
 OUTPUTS: Mapping[str, type] = {
-    'box': PolygonStamped, 'status': DiagnosticArray, 'marker': ImageMarker,
-    'confidence_map': Image, 'overlay': Image}
+    'box': PolygonStamped, 'boxes': PolygonInstanceStamped, 'status': DiagnosticArray,
+    'marker': ImageMarker, 'confidence_map': Image, 'overlay': Image}
+_ANSWER = ('box', 'boxes', 'status')
 _DISCOVERY_SECONDS = 10.0
 _POLL_SECONDS = 0.01
 _DEPTH = 100
@@ -88,7 +90,7 @@ class NodeSession:
     parameters : mapping
         Of the node: name to value.
     outputs : iterable of str
-        Names from OUTPUTS to listen to; `box` and `status` always are.
+        Names from OUTPUTS to listen to; `box`, `boxes` and `status` always are.
     compressed : bool
         Whether the images are sensor_msgs/CompressedImage.
     make_node : callable
@@ -108,7 +110,7 @@ class NodeSession:
         os.environ.setdefault('ROS_AUTOMATIC_DISCOVERY_RANGE', 'LOCALHOST')
         # Not a SimpleQueue, which may wait for ever when asked to wait for a few microseconds.
         self._heard: queue.Queue[Heard] = queue.Queue()
-        self._outputs = dict.fromkeys(('box', 'status', *outputs))
+        self._outputs = dict.fromkeys((*_ANSWER, *outputs))
         self._context = Context()
         rclpy.init(context=self._context)
         transport = 'compressed' if compressed else 'raw'
@@ -123,8 +125,8 @@ class NodeSession:
         self._executors: list[SingleThreadedExecutor] = []
         self._nodes: list[Node] = []
         try:
-            self._node = make_node(NODE_NAME, context=self._context, namespace=namespace,
-                                   parameter_overrides=overrides)
+            self._node = _made(make_node, context=self._context, namespace=namespace,
+                               parameter_overrides=overrides)
             self._nodes.append(self._node)
             if not self._node.is_active:
                 raise NodeError('the node did not start; its log above says why')
@@ -242,3 +244,11 @@ class NodeSession:
                                 'ROS 2 middleware settings (ROS_DOMAIN_ID, RMW_IMPLEMENTATION, '
                                 'discovery range) of this terminal')
             time.sleep(_POLL_SECONDS)
+
+
+def _made(make_node: Callable[..., TrackerNode], **arguments: Any) -> TrackerNode:
+    """Make the node, or say what of its parameters is wrong."""
+    try:
+        return make_node(NODE_NAME, **arguments)
+    except ParameterException as error:
+        raise NodeError(f'the node does not start: {error}') from error

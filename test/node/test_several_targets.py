@@ -14,9 +14,11 @@
 
 """Several targets over real ROS messages: started, told apart, selected, given up."""
 
+import time
 from unittest.mock import Mock
 
 from geometry_msgs.msg import PolygonInstanceStamped
+from nav_msgs.msg import Odometry
 import numpy as np
 import pytest
 from sensor_msgs.msg import Image, RegionOfInterest
@@ -200,6 +202,32 @@ def test_image_that_cannot_be_read_is_no_refused_start(several):
     broken = running.graph.image()
     broken.encoding = 'nonsense'
     assert running.send(broken).start == ''
+
+
+def test_as_many_as_there_may_be_are_started_and_told_at_once(run):
+    """All starts, and all answers to a frame, are said before anybody listens again."""
+    running = run(max_targets=64)
+    topics = [running.graph.listen(kind, f'lmsco_tracker/{name}') for name, kind in (
+        ('boxes', PolygonInstanceStamped), ('state', Odometry), ('marker', ImageMarker))]
+    running.send()
+    for x in range(64):
+        running.init_box.publish(RegionOfInterest(x_offset=x % 50, y_offset=12, width=8, height=6))
+    running.settle()
+    running.graph.spin_until(lambda: len(running.fake.results) == 64)
+    running.send()
+    worker, image = running.node._session.worker, running.graph.image()
+    running.fake.gate.clear()
+    running.images.publish(image)
+    running.graph.spin_until(lambda: worker.busy_seconds)
+    running.fake.gate.set()
+    while worker.busy_seconds:
+        time.sleep(0.001)
+    for messages in topics:
+        running.graph.spin_until(lambda: sum(
+            message.header == image.header for message in messages) == 64)
+    kept = {publisher.topic_name.rpartition('/')[2]: publisher.qos_profile.depth
+            for publisher in running.node.publishers}
+    assert {kept[name] for name in ('boxes', 'state', 'marker')} == {640} and kept['box'] == 10
 
 
 def test_reset_drops_all(several):
