@@ -18,9 +18,9 @@ How often two targets that cross change their numbers: one tracker for both, and
 Two persons who look the same cross in rendered scenes, and with `--dataset` a copy of the target
 crosses it in recordings (the challenge `twin_crosses`, around the moment at which both are in the
 same place). Both are started before they meet. A target is on the one that its box overlaps most,
-or lost; going from one onto the other is a switch. Printed is a table; with `--page` it takes the
-place of what stands between `<!-- crossings -->` and `<!-- /crossings -->` there. With the package
-on the path:
+or lost; going from one onto the other is a switch, but for frames in which they cover each other.
+Printed is a table; with `--page` it takes the place of what stands between `<!-- crossings -->`
+and `<!-- /crossings -->` there. With the package on the path:
 python -m benchmarks.crossings [--scenes N] [--dataset FOLDER] [--split FILE] [--page FILE]
 """
 
@@ -54,8 +54,8 @@ COLUMNS = ('crossing', 'pairs', 'tracker', 'switches', 'targets at the end: on t
 _SIZE, _FRAMES, _HEAT = (320, 256), 70, 7880.0
 # Frames before and after the meeting in a recording, and how far, in sizes, they are apart then.
 _MOST_AWAY, _LEAST_APART = 45, 1.5
-# Below this overlap a box is on nothing; above that of the two, nobody can tell on which it is.
-_SEEN, _ONE = 0.2, 0.2
+# Below this overlap a box is on nothing.
+_SEEN = 0.2
 
 
 @dataclass(frozen=True, eq=False)
@@ -202,12 +202,12 @@ def _seen(result: TrackResult) -> BoundingBox | None:
 
 
 def _place(box: BoundingBox | None, truth: npt.NDArray[np.float64]) -> int:
-    """Return which of the targets a box is on; -1 for none, or where they are in one place."""
+    """Return which of the targets a box is on; -1 for none, or while they cover each other."""
     if box is None or is_absent(truth).any():
         return -1
     both = [BoundingBox(*map(float, true)) for true in truth]
     overlaps = [box.overlap(true) for true in both]
-    told = max(overlaps) > _SEEN and both[0].overlap(both[1]) < _ONE
+    told = max(overlaps) > _SEEN and not both[0].intersection(both[1])
     return int(np.argmax(overlaps)) if told else -1
 
 
