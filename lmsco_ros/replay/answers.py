@@ -45,6 +45,8 @@ class Answer:
         Of the selected target; None until it arrives, and while the target is lost.
     boxed : set of int
         Numbers of the targets of which a box has arrived.
+    started : int
+        How many targets were started on the frame.
     received : float
         When the box, or without one the status, arrived, on the clock of `time.monotonic`.
 
@@ -53,6 +55,7 @@ class Answer:
     statuses: list[FrameStatus] = field(default_factory=list)
     box: BoundingBox | None = None
     boxed: set[int] = field(default_factory=set)
+    started: int = 0
     received: float = 0.0
 
     @property
@@ -96,6 +99,7 @@ class Answers:
         elif heard.output == 'status':
             answer.statuses = statuses_from_message(
                 deserialize_message(heard.data, DiagnosticArray))
+            answer.started += sum(status.start == 'accepted' for status in answer.statuses)
             answer.received = answer.received or heard.received
         return answer
 

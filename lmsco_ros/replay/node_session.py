@@ -57,6 +57,7 @@ OUTPUTS: Mapping[str, type] = {
 _ANSWER = ('box', 'boxes', 'status')
 _DISCOVERY_SECONDS = 10.0
 _POLL_SECONDS = 0.01
+# Messages of one topic that wait for us, for each target that there may be.
 _DEPTH = 100
 
 
@@ -133,7 +134,7 @@ class NodeSession:
             self._partner = rclpy.create_node('partner', context=self._context,
                                               namespace=namespace)
             self._nodes.append(self._partner)
-            self._connect(compressed)
+            self._connect(compressed, _DEPTH * self.max_targets)
             self._spin()
             self._wait_for_discovery()
         except BaseException:
@@ -153,6 +154,11 @@ class NodeSession:
     def outputs(self) -> tuple[str, ...]:
         """Names from OUTPUTS that are listened to."""
         return tuple(self._outputs)
+
+    @property
+    def max_targets(self) -> int:
+        """So many targets may there be."""
+        return self._node.settings.max_targets
 
     def publish_image(self, message: Image | CompressedImage | bytes) -> None:
         """Send an image to the node, as a message or as its serialized bytes."""
@@ -191,9 +197,9 @@ class NodeSession:
             node.destroy_node()
         self._nodes, self._threads = [], []
 
-    def _connect(self, compressed: bool) -> None:
+    def _connect(self, compressed: bool, depth: int) -> None:
         """Make the publishers and the subscriptions of the partner."""
-        reliable = QoSProfile(depth=_DEPTH, reliability=ReliabilityPolicy.RELIABLE)
+        reliable = QoSProfile(depth=depth, reliability=ReliabilityPolicy.RELIABLE)
         kind, topic = (CompressedImage, 'image_raw/compressed') if compressed \
             else (Image, 'image_raw')
         self._images = self._partner.create_publisher(kind, topic, reliable)

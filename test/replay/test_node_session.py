@@ -171,6 +171,25 @@ def test_frame_is_answered_when_all_its_boxes_are_there():
     assert all(exchange.latency > 0 for exchange in player.exchanges())
 
 
+def test_first_frame_is_answered_when_all_targets_are_started():
+    """And there is room for all that is said of them."""
+    tracker = Pair()
+    with session(tracker, max_targets=64) as running:
+        boxes, = [each for each in running._partner.subscriptions
+                  if each.topic_name.endswith('/boxes')]
+        assert boxes.qos_profile.depth >= 64 * 10
+        player = Player(running)
+        for _ in range(64):
+            player.start(START, SECOND)
+        player.send(SECOND, image_message(1, SECOND))
+        player.settle(0)
+        assert len(tracker.results) == 64
+        for index in range(2, 7):
+            player.send(index * SECOND, image_message(index, index * SECOND))
+        player.settle(0)
+    assert [len(exchange.answer.boxed) for exchange in player.exchanges()] == [64] * 6
+
+
 def test_any_refused_start_is_told():
     """The one that is accepted stands first in the status."""
     with session(Pair(), max_targets=2) as running:
