@@ -88,7 +88,7 @@ def _mark(part: Part, stamp: int) -> bytes:
 def play(bag: Path, output: Path, parameters: dict[str, object],
          rate: float = 1.0) -> list[Exchange]:
     """Play the bag through the node at the pace of the camera, or at another rate."""
-    plan = ReplayPlan(bag=bag, output=output, storage=Storage.MCAP, box=None, topic='/image_raw',
+    plan = ReplayPlan(bag=bag, output=output, storage=Storage.MCAP, boxes=(), topic='/image_raw',
                       rate=rate, frames=None, parameters=parameters, outputs=('overlay',))
     done = 0
 

@@ -16,7 +16,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import islice
 import math
@@ -32,7 +32,7 @@ from lmsco_ros.synthetic.figures import bounds, Capsule, rasterize
 from lmsco_ros.synthetic.landscape import render_landscape
 from lmsco_ros.synthetic.sensor import Sensor
 
-__all__ = ['Clip', 'moving_scene', 'recorded_clips', 'walking_scene']
+__all__ = ['Clip', 'moving_scene', 'paint', 'recorded_clips', 'walking_scene']
 
 _PAN = 0.7
 _DRIVE = 1.5
@@ -123,13 +123,18 @@ def moving_scene(size: tuple[int, int], target: float, count: int, seed: int = 1
                                flags=cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP)
         bodies = [_vehicle(x + _DRIVE * (index - count / 2), y, target) for x, y in places]
         for body in bodies:
-            layer = rasterize(body, scene.shape)
-            view = scene[layer.rows, layer.columns]
-            view += layer.alpha * (layer.heat - view)
+            paint(scene, body)
         frames.append(sensor.expose(scene, index / 30))
         boxes.append([bounds(body) for body in bodies])
     return Clip(f'vehicle of {target:g} pixels', frames,
                 np.array([first.as_tuple() for first, *_ in boxes]), tuple(boxes[0][1:]))
+
+
+def paint(scene: np.ndarray, body: Sequence[Capsule]) -> None:
+    """Draw a body over what is in a scene, float32 counts of shape (H, W)."""
+    layer = rasterize(body, scene.shape)
+    view = scene[layer.rows, layer.columns]
+    view += layer.alpha * (layer.heat - view)
 
 
 def _vehicle(x: float, y: float, side: float) -> tuple[Capsule, ...]:

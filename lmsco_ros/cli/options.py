@@ -55,9 +55,10 @@ SourceArgument = Annotated[Path, typer.Argument(
     help='Folder of images, TIFF stack, video file, or bag (rosbag2 or ROS 1).')]
 BagArgument = Annotated[Path, typer.Argument(
     exists=True, show_default=False, help='rosbag2 (sqlite3 or mcap).')]
-InitOption = Annotated[Box, typer.Option(
+InitOption = Annotated[list[Box], typer.Option(
     '--init', parser=parse_box, metavar='x,y,w,h', show_default=False,
-    help='Target in the first frame: top-left corner, width and height in pixels.')]
+    help='Target in the first frame: top-left corner, width and height in pixels; once for each '
+         'target.')]
 TopicOption = Annotated[str, typer.Option(
     '--topic', show_default=False,
     help='Image topic of the bag; needed only when it has several.')]

@@ -52,7 +52,11 @@ def replay(
     images: Annotated[bool, typer.Option(
         '--images', help='Record overlay and confidence map, too.')] = False,
 ) -> None:
-    """Play a bag through the node and record its answers beside the messages of the bag."""
+    """
+    Play a bag through the node and record its answers beside the messages of the bag.
+
+    Boxes are those of all targets with their ids on ~/boxes, and of the last one on ~/box.
+    """
     with plain_errors():
         require_ros()
         requested_config(preset, config)
@@ -62,9 +66,9 @@ def replay(
         extra: tuple[str, ...] = ('marker', 'overlay', 'confidence_map') if images \
             else ('marker',)
         plan = ReplayPlan(
-            bag=bag, output=output, storage=storage, box=BoundingBox(*init), topic=topic,
-            rate=rate, frames=frames, outputs=extra,
-            parameters=node_parameters(preset, config))
+            bag=bag, output=output, storage=storage,
+            boxes=tuple(BoundingBox(*box) for box in init), topic=topic, rate=rate,
+            frames=frames, outputs=extra, parameters=node_parameters(preset, config))
         run = Replay(plan)
         with telling_what_is_kept(lambda: run.kept), frame_progress() as progress:
             task = progress.add_task('replaying')

@@ -29,13 +29,9 @@ from rclpy.impl.implementation_singleton import rclpy_implementation
 from lmsco_ros.console.console_node import ConsoleNode
 from lmsco_ros.console.server import serving
 from lmsco_ros.console.settings import TOKEN_VARIABLE
-from lmsco_ros.node.executor import GuardedExecutor
 from lmsco_ros.node.faults import Faults
 from lmsco_ros.node.ros_arguments import explained, StartError
-from lmsco_ros.node.run import in_ros
-
-# The end of the process is noticed after this time at the latest.
-_LOOK_PERIOD = 0.1
+from lmsco_ros.node.run import in_ros, spin_until
 
 
 def run(arguments: Sequence[str], ending: threading.Event) -> int:
@@ -44,25 +40,14 @@ def run(arguments: Sequence[str], ending: threading.Event) -> int:
 
     The token is taken from the environment: everybody on the graph may read parameters.
 
-    Parameters
-    ----------
-    arguments : sequence of str
-        Those for ROS.
-    ending : threading.Event
-        Set when the process has to end.
-
-    Returns
-    -------
-    int
-        Exit code: 1 when it cannot start.
-
+    Parameters and exit code are those of :func:`lmsco_ros.node.run.run`.
     """
     try:
         with in_ros(arguments), _node() as node, serving(
                 node.desk, node.settings, os.environ.get(TOKEN_VARIABLE, '')) as address:
             node.get_logger().info(f'the page is at {address}')
             node.get_logger().info(f'waiting for images on {node.desk.image_topic}')
-            _spin(node, ending)
+            spin_until(ending, node, Faults(node.get_logger, lambda text: None, rclpy.ok).note)
             return 0
     except StartError as error:
         print(f'console: {error}', file=sys.stderr)
@@ -82,14 +67,3 @@ def _node() -> Iterator[ConsoleNode]:
         yield node
     finally:
         node.destroy_node()
-
-
-def _spin(node: ConsoleNode, ending: threading.Event) -> None:
-    faults = Faults(node.get_logger, lambda text: None, rclpy.ok)
-    executor = GuardedExecutor(faults.note)
-    try:
-        executor.add_node(node)
-        while not ending.is_set() and rclpy.ok():
-            executor.spin_once(timeout_sec=_LOOK_PERIOD)
-    finally:
-        executor.shutdown()

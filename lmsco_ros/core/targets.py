@@ -16,7 +16,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 import copy
 from threading import Lock
@@ -29,7 +29,7 @@ from lmsco_ros.core.config import TrackerConfig
 from lmsco_ros.core.errors import BusyError, ConfigError, ImageError
 from lmsco_ros.core.extent.pointing import extent_at
 from lmsco_ros.core.imaging.frame import Frame, read_frame
-from lmsco_ros.core.imaging.gain import AutomaticGain, survey
+from lmsco_ros.core.imaging.gain import AutomaticGain, FrameSurvey, survey
 from lmsco_ros.core.imaging.view import FrameView
 from lmsco_ros.core.networks.together import side_by_side
 from lmsco_ros.core.track import Track
@@ -98,42 +98,40 @@ class Targets:
             of the targets that stay; nothing changes.
 
         """
-        frame, box = read_frame(image), BoundingBox.of(box)
-        staying = {number: track for number, track in self._tracks.items()
-                   if number not in in_place_of}
-        if staying:
-            self._check(frame, time, staying.values())
-        track = Track(self._config, self._backend, self._networks,
-                      survey(frame.pixels, self._config.intensity), box, time)
-        self._started += 1
-        self._tracks, self._kind = {**staying, self._started: track}, frame.kind
-        return self._started
+        target = BoundingBox.of(box)
+        return self._begin(image, time, in_place_of, lambda surveyed: target)
 
-    def box_at(self, image: np.ndarray, point: Sequence[float]) -> BoundingBox:
+    def start_at(self, image: np.ndarray, point: Sequence[float],
+                 time: float | None = None, in_place_of: Collection[int] = ()) -> int:
         """
-        Return the box of what stands out at a point of a frame.
+        Start on what stands out at a point of a frame and return its number.
 
         Parameters
         ----------
         image : ndarray
-            The frame.
+            Frame that shows the target.
         point : sequence of float
             Image position (x, y) in pixels.
+        time, in_place_of
+            As for `start`.
 
         Raises
         ------
-        ImageError, PointError
-            When the frame cannot be read, or nothing stands out at the point.
+        PointError
+            When nothing stands out at the point; nothing changes, as with the errors of `start`.
         ConfigError
             When the configuration names no network that measures extents.
 
         """
-        if self._networks.extent is None:
+        network = self._networks.extent
+        if network is None:
             raise ConfigError('the configuration names no network that measures the extent of '
                               "what is at a point; set extent.network to 'extent', or give a box")
-        frame = survey(read_frame(image).pixels, self._config.intensity)
-        condition = AutomaticGain(self._config.intensity).examine(frame)
-        return extent_at(self._networks.extent, FrameView(frame.image, condition.intensity), point)
+
+        def box_at(surveyed: FrameSurvey) -> BoundingBox:
+            condition = AutomaticGain(self._config.intensity).examine(surveyed)
+            return extent_at(network, FrameView(surveyed.image, condition.intensity), point)
+        return self._begin(image, time, in_place_of, box_at)
 
     def advance(self, image: np.ndarray, time: float | None = None,
                 only: Collection[int] | None = None) -> dict[int, TrackResult]:
@@ -173,6 +171,20 @@ class Targets:
         """Forget all targets."""
         self._tracks = {}
 
+    def _begin(self, image: np.ndarray, time: float | None, in_place_of: Collection[int],
+               find: Callable[[FrameSurvey], BoundingBox]) -> int:
+        """Follow what is found in a frame, in place of others; return its number."""
+        frame = read_frame(image)
+        staying = {number: track for number, track in self._tracks.items()
+                   if number not in in_place_of}
+        if staying:
+            self._check(frame, time, staying.values())
+        surveyed = survey(frame.pixels, self._config.intensity)
+        track = Track(self._config, self._backend, self._networks, surveyed, find(surveyed), time)
+        self._started += 1
+        self._tracks, self._kind = {**staying, self._started: track}, frame.kind
+        return self._started
+
     def _check(self, frame: Frame, time: float | None, tracks: Iterable[Track]) -> None:
         """Refuse a frame of another size or type than those before, or of no fitting time."""
         for track in tracks:
@@ -186,19 +198,7 @@ class ConfiguredTargets:
     """
     Targets that one caller at a time may follow.
 
-    Parameters
-    ----------
-    config : TrackerConfig or str
-        How to track, or the name of a preset; the preset 'default' unless given.
-
-    Raises
-    ------
-    ConfigError
-        When there is no preset of that name, the configured device is not available, or a
-        network does not fit its blocks.
-    WeightsError
-        When the weights of a network are missing or damaged.
-
+    Parameters and errors are those of :class:`~lmsco_ros.core.tracker.LMSCOTracker`.
     """
 
     def __init__(self, config: TrackerConfig | str | None = None) -> None:

@@ -142,7 +142,8 @@ class Track:
         self._after_shutter = False
         verdict = self._monitor.judge(sighting.assessment)
         if verdict.believed:
-            self._follow(view, self._fused(view, sighting), verdict.state)
+            merged = neighbors is not None and neighbors.merged(self._box.area**0.5)
+            self._follow(view, self._fused(view, sighting), verdict.state, merged)
             self._motion.measure(self._box, box_covariance(sighting.detection, self._box))
         else:
             self._prediction.missed()
@@ -186,10 +187,11 @@ class Track:
             box = self._extent(box, sighting.measurement)
         return clamp_box(box, view.size)
 
-    def _follow(self, view: FrameView, box: BoundingBox, state: TrackState) -> None:
-        """Move to where the target is."""
+    def _follow(self, view: FrameView, box: BoundingBox, state: TrackState,
+                merged: bool = False) -> None:
+        """Move to where the target is, alone or in the place of another one."""
         self._box = box
-        self._prediction.seen(box.center)
+        self._prediction.seen(box.center, merged)
         self._redetection.restart()
         if state is TrackState.TRACKING and self._config.presence.distractors:
             self._observer.keep(view, box)
@@ -201,7 +203,7 @@ class Track:
             self._detector.train()
 
     def _anchor(self, sighting: Sighting) -> tuple[float, float]:
-        """Return the place (x, y) to learn: between the found and the fused one, if that is sure."""
+        """Return the place (x, y) to learn: the found one, nearer to the fused one if it is sure."""
         (x, y), (fused_x, fused_y) = sighting.detection.center, self._box.center
         if sighting.measurement is None:
             return x, y

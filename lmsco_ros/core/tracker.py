@@ -123,8 +123,7 @@ class LMSCOTracker(ConfiguredTargets):
 
         """
         with self._alone():
-            box = self._targets.box_at(image, point)
-            number = self._targets.start(image, box, time, self._targets.ids)
+            number = self._targets.start_at(image, point, time, self._targets.ids)
             return self._targets.results[number]
 
     def update(self, image: np.ndarray, time: float | None = None) -> TrackResult:
@@ -169,23 +168,8 @@ class MultiTracker(ConfiguredTargets):
     taken for another one that is known: where they meet, targets keep their numbers. Each frame
     is read and measured once for all.
 
-    Images, copies and pickles are those of :class:`LMSCOTracker`.
-
-    Parameters
-    ----------
-    config : TrackerConfig or str
-        How to track, or the name of a preset; the preset 'default' unless given.
-
-    Raises
-    ------
-    ConfigError
-        When there is no preset of that name, the configured device is not available, or a
-        network does not fit its blocks.
-    WeightsError
-        When the weights of a network are missing or damaged.
-    BusyError
-        From every method: when another thread is at work in this tracker. Nothing changes then.
-
+    Parameters and errors of its making, images, copies and pickles are those of
+    :class:`LMSCOTracker`; every method raises `BusyError` as its methods do.
     """
 
     @property
@@ -205,13 +189,8 @@ class MultiTracker(ConfiguredTargets):
 
         Parameters
         ----------
-        image : ndarray
-            Frame that shows the target.
-        box : BoundingBox, or four numbers
-            The target in that frame, (x, y, width, height) in pixels. It may reach over the
-            border, with a quarter of its area inside, but not be larger than the image.
-        time : float, optional
-            When the frame was taken, in seconds on any clock; then every frame has a time.
+        image, box, time
+            As for :meth:`LMSCOTracker.initialize`.
         in_place_of : collection of int
             Targets that are forgotten for it.
 
@@ -237,10 +216,8 @@ class MultiTracker(ConfiguredTargets):
 
         Parameters
         ----------
-        image : ndarray
-            Frame that shows the target.
-        point : sequence of float
-            Image position (x, y) on the target, in pixels.
+        image, point
+            As for :meth:`LMSCOTracker.initialize_at`.
         time, in_place_of
             As for `initialize`.
 
@@ -251,16 +228,13 @@ class MultiTracker(ConfiguredTargets):
 
         Raises
         ------
-        PointError
-            When the point is not in the image, or nothing stands out there; nothing changes, as
-            with the errors of `initialize`.
-        ConfigError
-            When the configuration names no network that measures extents.
+        PointError, ConfigError
+            As :meth:`LMSCOTracker.initialize_at`; nothing changes, as with the errors of
+            `initialize`.
 
         """
         with self._alone():
-            box = self._targets.box_at(image, point)
-            return self._targets.start(image, box, time, in_place_of)
+            return self._targets.start_at(image, point, time, in_place_of)
 
     def update(self, image: np.ndarray, time: float | None = None,
                only: Collection[int] | None = None) -> dict[int, TrackResult]:

@@ -103,7 +103,7 @@ class Inputs:
                     (PointStamped, 'init_point', self._on_point),
                     (UInt32, 'select', self._on_select), *self._detector()):
                 made.callback(node.destroy_subscription, node.create_subscription(
-                    kind, topic, callback, _BOX_DEPTH))
+                    kind, topic, callback, max(_BOX_DEPTH, settings.max_targets)))
             self._made = made.pop_all()
 
     @property

@@ -45,6 +45,8 @@ from msg_adapters.image import message_from_image
 from msg_adapters.markers import marker_from_box, marker_removal
 from msg_adapters.status import FrameStatus, message_from_statuses
 
+# Messages that are kept for who cannot take them at once; so many for each target where one speaks
+# of one target.
 _DEPTH = 10
 
 
@@ -71,15 +73,17 @@ class Outputs:
         self._node = node
         self._display_range = DisplayRange()
         self._frames = 0
+        self._outlined: set[int] = set()
+        each = _DEPTH * settings.max_targets
         with contextlib.ExitStack() as made:
             self._box = self._publisher(PolygonStamped, 'box', made)
-            self._boxes = self._publisher(PolygonInstanceStamped, 'boxes', made)
-            self.states = StateOutputs(
-                lambda kind, name: self._publisher(kind, name, made), node.get_logger().warning)
+            self._boxes = self._publisher(PolygonInstanceStamped, 'boxes', made, each)
+            self.states = StateOutputs(lambda kind, name: self._publisher(
+                kind, name, made, each), node.get_logger().warning)
             self._status = self._publisher(DiagnosticArray, 'status', made)
             self._confidence = self._publisher(Image, 'confidence_map', made)
             self._overlay = self._publisher(Image, 'overlay', made)
-            self._marker = self._publisher(ImageMarker, 'marker', made)
+            self._marker = self._publisher(ImageMarker, 'marker', made, each)
             self._detections = self._detections_publisher(made)
             self._made = made.pop_all()
 
@@ -114,7 +118,7 @@ class Outputs:
                 [Tracked(each.box.as_tuple(), str(number), each.score)
                  for number, each in found.items()], header))
         if _is_heard(self._marker):
-            self._marker.publish(self._outline(found.get(outcome.track_id), header))
+            self._publish_outlines(outcome, found, header)
         if result is not None and outcome.image is not None and _is_heard(self._confidence):
             self._confidence.publish(message_from_confidence(
                 result.confidence_map, result.search_region.as_tuple(),
@@ -131,10 +135,10 @@ class Outputs:
         """Take the topics away."""
         self._made.close()
 
-    def _publisher(self, message_type: type, name: str,
-                   made: contextlib.ExitStack) -> LifecyclePublisher:
-        """Make a publisher that goes away with the others."""
-        publisher = self._node.create_lifecycle_publisher(message_type, f'~/{name}', _DEPTH)
+    def _publisher(self, message_type: type, name: str, made: contextlib.ExitStack,
+                   depth: int = _DEPTH) -> LifecyclePublisher:
+        """Make a publisher, which keeps so many messages, that goes away with the others."""
+        publisher = self._node.create_lifecycle_publisher(message_type, f'~/{name}', depth)
         made.callback(self._node.destroy_lifecycle_publisher, publisher)
         return publisher
 
@@ -144,13 +148,22 @@ class Outputs:
         from vision_msgs.msg import Detection2DArray
         return self._publisher(Detection2DArray, 'detections', made)
 
-    def _outline(self, found: TrackResult | None, header: Header) -> ImageMarker:
+    def _publish_outlines(self, outcome: Outcome, found: Mapping[int, TrackResult],
+                          header: Header) -> None:
+        """Outline every target that is seen, and take away the outlines of the others."""
+        # Of frames that one target goes through late nothing is said of the others.
+        asked = self._outlined if outcome.live else set(outcome.results)
+        gone = asked - set(found)
         namespace = self._node.get_name()
-        if found is None:
-            return marker_removal(namespace=namespace, header=header)
-        blue, green, red = (value / 255 for value in state_color(found.state))
-        return marker_from_box(found.box.as_tuple(), (red, green, blue), namespace=namespace,
-                               line_width=self.settings.marker_line_width, header=header)
+        for number in gone:
+            self._marker.publish(marker_removal(
+                namespace=namespace, marker_id=number, header=header))
+        for number, result in found.items():
+            blue, green, red = (value / 255 for value in state_color(result.state))
+            self._marker.publish(marker_from_box(
+                result.box.as_tuple(), (red, green, blue), namespace=namespace, marker_id=number,
+                line_width=self.settings.marker_line_width, header=header))
+        self._outlined = self._outlined - gone | set(found)
 
     def _readings(self, image: npt.NDArray | None, result: TrackResult) -> Readings:
         """Return what is counted under a box of the image that the tracker sees."""

@@ -16,7 +16,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 import contextlib
 import gc
 import sys
@@ -26,6 +26,7 @@ import rclpy
 from rclpy.exceptions import NameValidationException, ParameterException
 from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.logging import LoggingSeverity, set_logger_level
+from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
 
 from lmsco_ros.node import parameter_files
@@ -119,13 +120,31 @@ def _spin(node: TrackerNode, ending: threading.Event) -> int:
     """Let the node work until the process has to end."""
     if node.settings.autostart and not node.is_active:
         return 1
-    executor = GuardedExecutor(node.faults.note)
+    _spare_the_garbage_collector()
+    spin_until(ending, node, node.faults.note)
+    return 0
+
+
+def spin_until(ending: threading.Event, node: Node,
+               on_fault: Callable[[str, BaseException], object]) -> None:
+    """
+    Let a node work until the process has to end.
+
+    Parameters
+    ----------
+    ending : threading.Event
+        Set when the process has to end.
+    node : rclpy.node.Node
+        In the default context.
+    on_fault : callable
+        As `note` of :class:`~lmsco_ros.node.executor.GuardedExecutor`.
+
+    """
+    executor = GuardedExecutor(on_fault)
     try:
-        _spare_the_garbage_collector()
         executor.add_node(node)
         while not ending.is_set() and rclpy.ok():
             executor.spin_once(timeout_sec=_LOOK_PERIOD)
-        return 0
     finally:
         executor.shutdown()
 

@@ -58,8 +58,8 @@ class ReplayPlan:
         Recording, and the new bag.
     storage : Storage
         File format of the new bag.
-    box : BoundingBox or None
-        Target in the first image; None: the boxes that the bag has on `init_box_stamped`.
+    boxes : tuple of BoundingBox
+        Targets in the first image; empty: the boxes that the bag has on `init_box_stamped`.
     topic : str
         Image topic; empty when there is only one.
     rate : float
@@ -69,14 +69,14 @@ class ReplayPlan:
     parameters : mapping
         Of the node.
     outputs : tuple of str
-        What to record of the node besides box and status.
+        What to record of the node besides boxes and status.
 
     """
 
     bag: Path
     output: Path
     storage: Storage
-    box: BoundingBox | None
+    boxes: tuple[BoundingBox, ...]
     topic: str
     rate: float
     frames: int | None
@@ -144,8 +144,8 @@ class Replay:
                 raise SourceError(f'{plan.bag} is a bag of ROS 1; convert it with '
                                   f'"rosbags-convert --src {plan.bag} --dst NEW", and replay that')
             images = choose_topic(reader, plan.bag, plan.topic)
-            parameters = {'image_reliability': 'reliable', **plan.parameters,
-                          'frame_policy': 'latest' if plan.rate else 'all'}
+            parameters = {'image_reliability': 'reliable', 'max_targets': len(plan.boxes) or 1,
+                          **plan.parameters, 'frame_policy': 'latest' if plan.rate else 'all'}
             with NodeSession(parameters, outputs=plan.outputs,
                              compressed=images.msgtype == COMPRESSED) as session, \
                     self._output as output:
@@ -227,14 +227,14 @@ class _Playback:
             self._player.listen_until(self._pace.moment(logged))
         else:
             self._player.settle(_AHEAD if self._sent > 1 else 0)
-        if not self._sent and self._plan.box is not None:
-            self._player.start(self._plan.box, stamp)
+        for box in () if self._sent else self._plan.boxes:
+            self._player.start(box, stamp)
         self._recorder.copy_image(channel, logged, data, stamp)
         self._player.send(stamp, data)
         self._sent += 1
 
     def _play_other(self, channel: Channel, logged: int, data: bytes) -> None:
-        if self._plan.box is None and channel.topic == MARKS_TOPIC:
+        if not self._plan.boxes and channel.topic == MARKS_TOPIC:
             self._player.start(_marked(data), serialized_stamp(data))
         self._recorder.copy(channel, logged, data)
 

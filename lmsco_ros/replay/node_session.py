@@ -31,9 +31,10 @@ from types import TracebackType
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray
-from geometry_msgs.msg import PolygonStamped
+from geometry_msgs.msg import PolygonInstanceStamped, PolygonStamped
 import rclpy
 from rclpy.context import Context
+from rclpy.exceptions import ParameterException
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.logging import LoggingSeverity, set_logger_level
@@ -51,10 +52,12 @@ from msg_adapters.boxes import polygon_from_box
 
 NODE_NAME = 'lmsco_tracker'
 OUTPUTS: Mapping[str, type] = {
-    'box': PolygonStamped, 'status': DiagnosticArray, 'marker': ImageMarker,
-    'confidence_map': Image, 'overlay': Image}
+    'box': PolygonStamped, 'boxes': PolygonInstanceStamped, 'status': DiagnosticArray,
+    'marker': ImageMarker, 'confidence_map': Image, 'overlay': Image}
+_ANSWER = ('box', 'boxes', 'status')
 _DISCOVERY_SECONDS = 10.0
 _POLL_SECONDS = 0.01
+# Messages of one topic that wait for us, for each target that there may be.
 _DEPTH = 100
 
 
@@ -88,7 +91,7 @@ class NodeSession:
     parameters : mapping
         Of the node: name to value.
     outputs : iterable of str
-        Names from OUTPUTS to listen to; `box` and `status` always are.
+        Names from OUTPUTS to listen to; `box`, `boxes` and `status` always are.
     compressed : bool
         Whether the images are sensor_msgs/CompressedImage.
     make_node : callable
@@ -108,7 +111,7 @@ class NodeSession:
         os.environ.setdefault('ROS_AUTOMATIC_DISCOVERY_RANGE', 'LOCALHOST')
         # Not a SimpleQueue, which may wait for ever when asked to wait for a few microseconds.
         self._heard: queue.Queue[Heard] = queue.Queue()
-        self._outputs = dict.fromkeys(('box', 'status', *outputs))
+        self._outputs = dict.fromkeys((*_ANSWER, *outputs))
         self._context = Context()
         rclpy.init(context=self._context)
         transport = 'compressed' if compressed else 'raw'
@@ -123,15 +126,15 @@ class NodeSession:
         self._executors: list[SingleThreadedExecutor] = []
         self._nodes: list[Node] = []
         try:
-            self._node = make_node(NODE_NAME, context=self._context, namespace=namespace,
-                                   parameter_overrides=overrides)
+            self._node = _made(make_node, context=self._context, namespace=namespace,
+                               parameter_overrides=overrides)
             self._nodes.append(self._node)
             if not self._node.is_active:
                 raise NodeError('the node did not start; its log above says why')
             self._partner = rclpy.create_node('partner', context=self._context,
                                               namespace=namespace)
             self._nodes.append(self._partner)
-            self._connect(compressed)
+            self._connect(compressed, _DEPTH * self.max_targets)
             self._spin()
             self._wait_for_discovery()
         except BaseException:
@@ -151,6 +154,11 @@ class NodeSession:
     def outputs(self) -> tuple[str, ...]:
         """Names from OUTPUTS that are listened to."""
         return tuple(self._outputs)
+
+    @property
+    def max_targets(self) -> int:
+        """So many targets may there be."""
+        return self._node.settings.max_targets
 
     def publish_image(self, message: Image | CompressedImage | bytes) -> None:
         """Send an image to the node, as a message or as its serialized bytes."""
@@ -189,9 +197,9 @@ class NodeSession:
             node.destroy_node()
         self._nodes, self._threads = [], []
 
-    def _connect(self, compressed: bool) -> None:
+    def _connect(self, compressed: bool, depth: int) -> None:
         """Make the publishers and the subscriptions of the partner."""
-        reliable = QoSProfile(depth=_DEPTH, reliability=ReliabilityPolicy.RELIABLE)
+        reliable = QoSProfile(depth=depth, reliability=ReliabilityPolicy.RELIABLE)
         kind, topic = (CompressedImage, 'image_raw/compressed') if compressed \
             else (Image, 'image_raw')
         self._images = self._partner.create_publisher(kind, topic, reliable)
@@ -242,3 +250,11 @@ class NodeSession:
                                 'ROS 2 middleware settings (ROS_DOMAIN_ID, RMW_IMPLEMENTATION, '
                                 'discovery range) of this terminal')
             time.sleep(_POLL_SECONDS)
+
+
+def _made(make_node: Callable[..., TrackerNode], **arguments: Any) -> TrackerNode:
+    """Make the node, or say what of its parameters is wrong."""
+    try:
+        return make_node(NODE_NAME, **arguments)
+    except ParameterException as error:
+        raise NodeError(f'the node does not start: {error}') from error

@@ -16,6 +16,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import islice
@@ -80,10 +81,12 @@ class Player:
         self._on_heard = on_heard
         self._answers = Answers()
         self._sent: dict[int, float] = {}
+        self._starts: Counter[int] = Counter()
         self._pending: list[int] = []
 
     def start(self, box: BoundingBox, stamp: int) -> None:
         """Ask the node to start on `box` in the frame with `stamp`, which may follow."""
+        self._starts[stamp] += 1
         self._session.publish_start(box, header_at(stamp))
 
     def send(self, stamp: int, message: Image | CompressedImage | bytes) -> None:
@@ -149,7 +152,9 @@ class Player:
             self._on_heard(heard, stamp, heard.received - self._sent[stamp])
         if answer.failure:
             raise NodeError(f'the node refuses: {answer.failure}')
-        if answer.is_tracked and stamp in self._pending:
+        # Of more starts than there may be targets, the first are superseded.
+        starts = min(self._starts[stamp], self._session.max_targets)
+        if answer.is_tracked and answer.started >= starts and stamp in self._pending:
             # The node answers in order: what it left out will never be answered.
             del self._pending[:self._pending.index(stamp) + 1]
 

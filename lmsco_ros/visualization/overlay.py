@@ -80,16 +80,17 @@ def draw_overlay(image: npt.NDArray, result: TrackResult | None, *,
 def draw_targets(image: npt.NDArray, results: Mapping[int, TrackResult], selected: int, *,
                  label: str = '') -> npt.NDArray[np.uint8]:
     """
-    Draw the selected target as `draw_overlay` does, and the boxes of the others.
+    Draw the selected target as `draw_overlay` does, and the others with number and score.
 
     Parameters
     ----------
     image : ndarray
         As for `draw_overlay`.
     results : mapping of int to TrackResult
-        By the numbers of the targets, which are written beside the boxes where there are several.
+        By the numbers of the targets, which are written beside the boxes with their scores;
+        where there was only one so far, its box stands alone.
     selected : int
-        Of which target score and state are told.
+        Of which target state and score are told in the corner.
     label : str
         Text for the lower left corner.
 
@@ -104,7 +105,7 @@ def draw_targets(image: npt.NDArray, results: Mapping[int, TrackResult], selecte
         if number != selected:
             draw_box(canvas, result.box, state_color(result.state),
                      dashed=result.state is TrackState.LOST)
-        if len(results) > 1:
+        if max(results) > 1:
             _draw_number(canvas, number, result)
     return canvas
 
@@ -186,8 +187,8 @@ def _draw_status(canvas: npt.NDArray[np.uint8], result: TrackResult) -> None:
 
 
 def _draw_number(canvas: npt.NDArray[np.uint8], number: int, result: TrackResult) -> None:
-    """Write the number of a target at the lower left corner of its box, below it or inside."""
-    text, scale = str(number), _text_scale(canvas)
+    """Write number and score of a target at the lower left corner of its box, or inside."""
+    text, scale = f'{number} {result.score:.2f}', _text_scale(canvas)
     (width, height), _ = cv2.getTextSize(text, _FONT, scale, 1)
     pad = max(2, round(4 * scale))
     plate = width + 2 * pad, height + 2 * pad

@@ -15,6 +15,7 @@
 """Folder -> make-bag -> replay -> bag: the answers stand beside the original messages."""
 
 from collections import Counter
+import csv
 import signal
 import time
 
@@ -81,6 +82,36 @@ def test_node_and_library_agree(lmsco, tmp_path, bag, start):
     answers = [corners(m).as_tuple() for topic, _, m in read(tmp_path / 'out')
                if topic == '/lmsco_tracker/box']
     np.testing.assert_allclose(answers, expected, atol=0.01)
+
+
+def test_node_and_library_agree_on_several_targets(lmsco, tmp_path, bag, scene, start):
+    """Every target has its id, on ~/boxes and ~/status as in the rows of `lmsco track`."""
+    height, width = scene[0].image.shape
+    targets = ('--init', start, '--init', f'{0.7 * width},{0.6 * height},20,24')
+    outcome = lmsco('replay', bag, *targets, '--rate', 0, '--output', tmp_path / 'out')
+    assert outcome.exit_code == 0, outcome.output
+    assert '15 of 15 frames answered' in outcome.words
+    assert lmsco('track', bag, *targets, '--output', tmp_path / 'run').exit_code == 0
+    with (tmp_path / 'run' / 'boxes.csv').open() as file:
+        rows = [row for row in csv.DictReader(file) if row['x']]
+    expected = {(int(row['id']), row['stamp']): [
+        float(row[name]) for name in ('x', 'y', 'width', 'height')] for row in rows}
+    messages, answers = read(tmp_path / 'out'), {}
+    for topic, _, message in messages:
+        if topic == '/lmsco_tracker/boxes':
+            stamp = message.header.stamp
+            answers[message.polygon.id, f'{stamp.sec}.{stamp.nanosec:09d}'] = corners(
+                message.polygon).as_tuple()
+    assert {number for number, _ in answers} == {1, 2} and set(answers) == set(expected)
+    for key, box in answers.items():
+        np.testing.assert_allclose(box, expected[key], atol=0.01)
+
+
+def test_more_targets_than_the_node_may_have_are_told(lmsco, tmp_path, bag, start):
+    outcome = lmsco('replay', bag, *('--init', start) * 65, '--output', tmp_path / 'out')
+    assert outcome.exit_code == 1 and not (tmp_path / 'out').exists()
+    assert 'max_targets' in outcome.words and '65' in outcome.words
+    assert 'Traceback' not in outcome.output
 
 
 def test_old_bags_without_type_definitions(lmsco, tmp_path, scene, start):

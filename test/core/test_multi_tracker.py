@@ -176,12 +176,24 @@ def test_frame_is_measured_once_for_all(scene, monkeypatch):
     survey = targets_module.survey
     monkeypatch.setattr(targets_module, 'survey', lambda image, config: (
         measured.append(image), survey(image, config))[1])
-    tracker = MultiTracker('hcs')
-    for center in paths(0):
+    tracker = MultiTracker()
+    for count, center in enumerate(paths(0), 1):
         tracker.initialize(frame(scene, *paths(0)), box_of(center))
-    measured.clear()
+        assert len(measured) == count
     tracker.update(frame(scene, *paths(1)))
-    assert len(measured) == 1
+    assert len(measured) == 4
+    # Where a point is, the box is found in what was measured.
+    tracker.initialize_at(frame(scene, *paths(1)), paths(1)[0])
+    assert len(measured) == 5
+
+
+def test_frame_that_does_not_fit_is_refused_before_a_point_is_looked_at(scene):
+    tracker, image = MultiTracker(), frame(scene, *paths(0))
+    tracker.initialize(image, box_of(paths(0)[0]), 1.0)
+    for wrong, time, error in ((image[:120], 2.0, ImageError), (image, None, TimeError)):
+        with pytest.raises(error):
+            tracker.initialize_at(wrong, (-1, -1), time)
+    assert tracker.ids == (1,)
 
 
 def test_late_target_catches_up_alone(scene):
@@ -230,13 +242,22 @@ def test_targets_know_where_the_certain_ones_among_them_go(scene):
     assert [spy.others for spy in known.values()] == [[(3, 6)], [(1, 2), (3, 6)], [(1, 2)]]
 
 
-@pytest.mark.parametrize('speed, gap', [(1.5, 0), (3, 6), (5, 10), (8, 20)])
+@pytest.mark.parametrize('speed, gap', [(0.6, 3), (1.5, 0), (3, 6), (5, 10), (8, 20)])
 def test_targets_that_look_the_same_and_cross_keep_their_numbers(scene, speed, gap):
-    """With a tracker for each, both would go on with the same one in three of these."""
-    def crossing(number):
-        return (40 + speed * number, 80 - gap / 2), (200 - speed * number, 80 + gap / 2)
+    """
+    With a tracker for each, both would go on with the same one in three of these.
 
-    tracker, count = MultiTracker(), int(160 / speed)
+    The slow ones are in one place for so long that they would turn around, if what is seen of
+    both there were taken for their motion.
+    """
+    count = min(int(160 / speed), 150)
+    way = speed * count / 2
+
+    def crossing(number):
+        return ((120 - way + speed * number, 80 - gap / 2),
+                (120 + way - speed * number, 80 + gap / 2))
+
+    tracker = MultiTracker()
     for center in crossing(0):
         tracker.initialize(frame(scene, *crossing(0)), box_of(center))
     for number in range(1, count):

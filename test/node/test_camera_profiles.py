@@ -68,5 +68,7 @@ def test_count_of_the_manual_is_its_temperature(graph, profile):
 def test_profile_names_its_source_and_its_use(profile):
     head = profile.read_text().split('/**/')[0]
     assert re.search(r'^# Source: \S+', head, re.M)
+    # What nobody could look up is told from what was.
+    assert re.search(r'^# Not verified: \S+', head, re.M)
     assert f'cameras/{profile.name}' in head and f'camera_profile:={profile.stem}' in head
     assert re.search(r'\d+ *\n?#? *Hz', head)

@@ -15,6 +15,8 @@
 
 """The node with the tracker that it is made for."""
 
+from collections.abc import Iterator
+from itertools import islice
 from types import SimpleNamespace
 
 import cv2
@@ -25,7 +27,10 @@ import pytest
 from scipy.stats import chi2
 from sensor_msgs.msg import Image
 
+from lmsco_ros.core.types import BoundingBox
+from lmsco_ros.evaluation.challenges.regions import without_region
 from lmsco_ros.node.tracker_factory import make_tracker
+from lmsco_ros.synthetic import render_scene, SceneConfig
 from msg_adapters.boxes import box_from_polygon
 from msg_adapters.state import state_from_odometry
 
@@ -131,6 +136,42 @@ def test_state_is_within_its_covariance_seen_and_coasting_for_a_second(run):
     assert len(spreads['lost']) > 20 and (np.diff(spreads['lost']) > 0).all()
     # A side of the target at most after a second, and much less while it is seen.
     assert max(spreads['tracking'][1:]) < 0.05 * max(spreads['lost']) < 28**2
+
+
+def _walk(seed: int) -> Iterator[tuple[np.ndarray, BoundingBox]]:
+    """Yield images and true boxes of a walker, who is out of the picture for the last second."""
+    rng = np.random.default_rng(seed)
+    scene = render_scene(SceneConfig(320, 256, seed=seed, target_height=0.25))
+    for frame in islice(scene, 30, 110):
+        image, around = frame.image, np.array(frame.box.scaled(1.3).as_tuple())
+        yield image if frame.index < 80 else without_region(image, around, rng), frame.box
+
+
+def test_errors_in_rendered_scenes_are_within_what_the_state_says(run):
+    """Frames of one scene share errors: each scene is one draw, judged by chi square."""
+    running, seen, coasting = run(tracker_factory=make_tracker), [], []
+    states = running.graph.listen(Odometry, 'lmsco_tracker/state')
+    for seed in range(1, 5):
+        told = []
+        for image, box in _walk(seed):
+            message = running.graph.image(shape=image.shape)
+            np.frombuffer(message.data, np.uint16).reshape(image.shape)[:] = image
+            if not told:
+                stamp = message.header.stamp
+                running.start_stamped(box.as_tuple(), stamp.sec * 10**9 + stamp.nanosec)
+            said = running.send(message).state
+            state = state_from_odometry(running.graph.answer(states, message))
+            error = np.subtract(state.center, box.center)
+            told.append((said, error @ np.linalg.solve(state.covariance, error)))
+            # It says something: in sides of the target, also after a second without it.
+            side = np.sqrt(np.trace(state.covariance) / 2 / box.area)
+            assert side < (1 if said == 'lost' else 0.2)
+        assert [said for said, _ in told[:50] + told[-25:]] == 50 * ['tracking'] + 25 * ['lost']
+        far = np.array([distance for _, distance in told])
+        assert np.mean(far < chi2.ppf(0.95, 2)) > 0.95
+        seen.append(far[1:50].mean())
+        coasting.append(far[-1])
+    assert max(sum(seen), sum(coasting)) < chi2.ppf(0.975, 2 * len(seen))
 
 
 def test_point_where_nothing_is_is_refused(points):

@@ -14,19 +14,23 @@
 
 """Several targets over real ROS messages: started, told apart, selected, given up."""
 
+import time
 from unittest.mock import Mock
 
 from geometry_msgs.msg import PolygonInstanceStamped
+from nav_msgs.msg import Odometry
 import numpy as np
 import pytest
 from sensor_msgs.msg import Image, RegionOfInterest
 from std_msgs.msg import UInt32
 from std_srvs.srv import Trigger
+from visualization_msgs.msg import ImageMarker
 
 from lmsco_ros.core.errors import BoxError
 from lmsco_ros.core.types import TrackState
 from msg_adapters.boxes import box_from_polygon
 from msg_adapters.image import image_from_message
+from msg_adapters.markers import box_from_marker
 from msg_adapters.status import Level, statuses_from_message
 
 MARGIN = dict(crop_left=3, crop_top=2)
@@ -200,6 +204,32 @@ def test_image_that_cannot_be_read_is_no_refused_start(several):
     assert running.send(broken).start == ''
 
 
+def test_as_many_as_there_may_be_are_started_and_told_at_once(run):
+    """All starts, and all answers to a frame, are said before anybody listens again."""
+    running = run(max_targets=64)
+    topics = [running.graph.listen(kind, f'lmsco_tracker/{name}') for name, kind in (
+        ('boxes', PolygonInstanceStamped), ('state', Odometry), ('marker', ImageMarker))]
+    running.send()
+    for x in range(64):
+        running.init_box.publish(RegionOfInterest(x_offset=x % 50, y_offset=12, width=8, height=6))
+    running.settle()
+    running.graph.spin_until(lambda: len(running.fake.results) == 64)
+    running.send()
+    worker, image = running.node._session.worker, running.graph.image()
+    running.fake.gate.clear()
+    running.images.publish(image)
+    running.graph.spin_until(lambda: worker.busy_seconds)
+    running.fake.gate.set()
+    while worker.busy_seconds:
+        time.sleep(0.001)
+    for messages in topics:
+        running.graph.spin_until(lambda: sum(
+            message.header == image.header for message in messages) == 64)
+    kept = {publisher.topic_name.rpartition('/')[2]: publisher.qos_profile.depth
+            for publisher in running.node.publishers}
+    assert {kept[name] for name in ('boxes', 'state', 'marker')} == {640} and kept['box'] == 10
+
+
 def test_reset_drops_all(several):
     running = several()
     assert running.graph.call(Trigger, 'lmsco_tracker/reset').message == 'all targets are dropped'
@@ -234,6 +264,41 @@ def test_overlay_tells_the_targets_apart(several):
     # Both boxes, and the numbers below them.
     assert all((drawn[15, x - 2:x + 3] != drawn[40, 60]).any() for x in (11, 31))
     assert all((drawn[20:30, x:x + 8] != drawn[40, 60]).any() for x in (11, 31))
+
+
+def outlines(markers, image):
+    """Return the boxes that the markers of an image draw, None where one is taken away."""
+    return {marker.id: box_from_marker(marker) for marker in markers
+            if marker.header == image.header}
+
+
+def test_every_target_has_a_marker_of_its_own(several):
+    running = several()
+    markers = running.graph.listen(ImageMarker, 'lmsco_tracker/marker')
+    image, lost, dropped = (running.graph.image() for _ in range(3))
+    running.send(image)
+    running.graph.spin_until(lambda: len(outlines(markers, image)) == 2)
+    assert outlines(markers, image) == {1: (11, 12, 8, 6), 2: (31, 12, 8, 6)}
+    running.fake.states = [TrackState.LOST, TrackState.TRACKING]
+    running.send(lost)
+    running.graph.spin_until(lambda: len(outlines(markers, lost)) == 2)
+    assert outlines(markers, lost) == {1: None, 2: (32, 12, 8, 6)}
+    assert {marker.ns for marker in markers} == {'lmsco_tracker'}
+    running.graph.call(Trigger, 'lmsco_tracker/reset')
+    running.send(dropped)
+    running.graph.spin_until(lambda: outlines(markers, dropped))
+    assert outlines(markers, dropped) == {2: None}
+
+
+def test_target_that_catches_up_leaves_the_markers_of_the_others(several):
+    running = several()
+    markers = running.graph.listen(ImageMarker, 'lmsco_tracker/marker')
+    first, second = (running.graph.image() for _ in range(2))
+    running.send(first, second)
+    stamp = first.header.stamp
+    running.start_stamped((50, 12, 8, 6), stamp.sec * 10 ** 9 + stamp.nanosec)
+    running.graph.spin_until(lambda: 3 in outlines(markers, second))
+    assert not [marker for marker in markers if box_from_marker(marker) is None]
 
 
 def test_detections_hold_all_targets(several, monkeypatch):

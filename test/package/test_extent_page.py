@@ -69,7 +69,7 @@ def test_report_of_the_network_is_that_of_its_training():
         for name, *figures in (row.values() for row in records('extent_report'))]
 
 
-@pytest.mark.parametrize('name', NETWORKS)
+@pytest.mark.parametrize('name', [*NETWORKS, 'extent_first'])
 def test_log_on_the_card_is_that_of_the_training(name):
     first, *_, last = records(f'{name}_log')
     (steps, loss, accuracy), = (row[1:] for row in rows(CARD, 'network | steps')

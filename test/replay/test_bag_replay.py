@@ -64,7 +64,7 @@ def run(tmp_path, monkeypatch):
     def replay(bag, on_frame=lambda: None, **changes):
         plan = ReplayPlan(**{
             'bag': bag, 'output': tmp_path / 'out', 'storage': Storage.MCAP,
-            'box': BoundingBox(1, 1, 2, 2), 'topic': '', 'rate': 0.0, 'frames': None,
+            'boxes': (BoundingBox(1, 1, 2, 2),), 'topic': '', 'rate': 0.0, 'frames': None,
             'parameters': {}, 'outputs': (), **changes})
         replay.last = Replay(plan)
         return replay.last.run(lambda total: None, on_frame)

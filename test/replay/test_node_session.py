@@ -61,10 +61,10 @@ class Follower:
         return TrackResult(box, 0.5, state, np.ones((4, 4), np.float32), box)
 
 
-def session(tracker, policy='all', outputs=()):
+def session(tracker, policy='all', outputs=(), **parameters):
     make_node = partial(TrackerNode, tracker_factory=lambda settings: tracker)
     return NodeSession({'frame_policy': policy, 'image_reliability': 'reliable',
-                        'image_depth': 0},
+                        'image_depth': 0, **parameters},
                        outputs=outputs, make_node=make_node)
 
 
@@ -142,7 +142,71 @@ def test_refused_start_is_told():
             player.settle(0)
 
 
+class Pair(Follower):
+    """Follows several targets; the second one is refused where it lies at y = 60."""
+
+    def initialize(self, image, box, time, in_place_of=()):
+        if box.y > 59:
+            raise BoxError('the second box is outside of the image')
+        self.results[len(self.results) + 1] = self._result(image, box)
+        return len(self.results)
+
+    def update(self, image, time, only=None):
+        box = BoundingBox(float(image[0, 0]), 6, 10, 12)
+        self.results = {number: self._result(image, box) for number in self.results}
+        return self.results
+
+
+def test_frame_is_answered_when_all_its_boxes_are_there():
+    with session(Pair(), max_targets=2) as running:
+        player = Player(running)
+        player.start(START, SECOND)
+        player.start(START, SECOND)
+        for index in range(1, 9):
+            player.send(index * SECOND, image_message(index, index * SECOND))
+            player.settle(0)
+            if index > 1:
+                answer = player.exchanges()[-1].answer
+                assert answer.boxed == {1, 2} and len(answer.statuses) == 2
+    assert all(exchange.latency > 0 for exchange in player.exchanges())
+
+
+def test_first_frame_is_answered_when_all_targets_are_started():
+    """And there is room for all that is said of them."""
+    tracker = Pair()
+    with session(tracker, max_targets=64) as running:
+        boxes, = [each for each in running._partner.subscriptions
+                  if each.topic_name.endswith('/boxes')]
+        assert boxes.qos_profile.depth >= 64 * 10
+        player = Player(running)
+        for _ in range(64):
+            player.start(START, SECOND)
+        player.send(SECOND, image_message(1, SECOND))
+        player.settle(0)
+        assert len(tracker.results) == 64
+        for index in range(2, 7):
+            player.send(index * SECOND, image_message(index, index * SECOND))
+        player.settle(0)
+    assert [len(exchange.answer.boxed) for exchange in player.exchanges()] == [64] * 6
+
+
+def test_any_refused_start_is_told():
+    """The one that is accepted stands first in the status."""
+    with session(Pair(), max_targets=2) as running:
+        player = Player(running)
+        player.start(START, SECOND)
+        player.send(SECOND, image_message(1, SECOND))
+        player.settle(0)
+        player.start(BoundingBox(5, 60, 10, 12), 2 * SECOND)
+        player.send(2 * SECOND, image_message(1, 2 * SECOND))
+        with pytest.raises(NodeError, match='second box is outside'):
+            player.settle(0)
+            player.listen_until(time.monotonic() + 100)
+
+
 def test_node_that_does_not_start_is_told():
+    with pytest.raises(NodeError, match='max_targets'):
+        session(Follower(), max_targets=65)
     with pytest.raises(NodeError, match='did not start'):
         NodeSession({'preset': 'no such preset'})
 

@@ -14,6 +14,8 @@
 
 """The overlay shows what the tracker said and leaves the picture alone otherwise."""
 
+from dataclasses import replace
+
 from hypothesis import given, settings, strategies as st
 import numpy as np
 import pytest
@@ -71,26 +73,33 @@ def test_state_decides_the_color(state):
     assert state_seen_along(canvas[50, 60:100]) is state
 
 
-def test_one_target_is_drawn_as_ever():
-    one = draw_targets(scene(), {3: result_of()}, 3, label='frame 3')
-    np.testing.assert_array_equal(one, draw_overlay(scene(), result_of(), label='frame 3'))
+def test_first_target_is_drawn_alone_and_a_later_one_with_its_number():
+    one = draw_targets(scene(), {1: result_of()}, 1, label='frame 3')
+    plain = draw_overlay(scene(), result_of(), label='frame 3')
+    np.testing.assert_array_equal(one, plain)
     np.testing.assert_array_equal(draw_targets(scene(), {}, 0), draw_overlay(scene(), None))
+    # Those before it are gone; which one this is has to be told still.
+    assert (draw_targets(scene(), {3: result_of()}, 3, label='frame 3') != plain).any()
 
 
-def test_several_targets_are_told_apart_by_their_numbers():
-    """The selected one has score and state in the corner, the other one its color and number."""
-    other = result_of(TrackState.UNCERTAIN, BoundingBox(110.5, 70.5, 20, 20))
+def test_several_targets_are_told_apart_by_number_score_and_state():
+    """State and score of the selected one are in the corner, number and score beside each box."""
+    other = result_of(TrackState.UNCERTAIN, BoundingBox(105.5, 60.5, 20, 20), 0.35)
     results, image = {1: result_of(), 2: other}, np.zeros((120, 160), np.uint8)
     canvas = draw_targets(image, results, 1)
     alone = draw_overlay(image, result_of())
     changed = (canvas != alone).any(-1)
-    assert state_seen_along(canvas[70, 112:128]) is TrackState.UNCERTAIN
-    # Numbers are written below both boxes, and nothing else has changed.
-    assert changed[81:95, 60:75].any() and changed[91:105, 110:125].any()
-    changed[68:106, 108:134] = changed[79:96, 58:78] = False
+    assert state_seen_along(canvas[60, 107:123]) is TrackState.UNCERTAIN
+    # Both are written below their boxes, and nothing else has changed.
+    beside = np.s_[82:100, 60:103], np.s_[82:100, 105:150]
+    assert all(changed[place].any() for place in beside)
+    changed[58:83, 103:128] = False
+    for place in beside:
+        changed[place] = False
     assert not changed.any()
-    swapped = draw_targets(image, {7: result_of(), 2: other}, 7)
-    assert (swapped[81:95, 60:75] != canvas[81:95, 60:75]).any()
+    for others in ({7: results[1], 2: other}, {1: results[1], 2: replace(other, score=0.85)}):
+        swapped = draw_targets(image, others, max(others) if 7 in others else 1)
+        assert (swapped[82:100] != canvas[82:100]).any()
 
 
 @pytest.mark.parametrize('box', [(-30, -30, 40, 40), (140, 110, 60, 60), (150, -5, 30, 300)])

@@ -26,6 +26,8 @@ _Point = tuple[float, float]
 
 # How far from where another target is expected its detection may lie, in sides of a target.
 _REACH = 0.75
+# How near to each other targets are of which nobody can tell what is whose, in the same.
+_MERGED = 0.5
 
 
 @dataclass(frozen=True)
@@ -49,6 +51,10 @@ class Neighbors:
         """Return whether something found is another target's; a side has `side` pixels."""
         place = np.array(found)
         return bool(self._distances(place).min() < _REACH * side and not self.owned(place))
+
+    def merged(self, side: float) -> bool:
+        """Return whether another target gets to the same place; a side has `side` pixels."""
+        return bool(self._distances(np.array(self.own)).min() < _MERGED * side)
 
     def owned(self, places: np.ndarray) -> np.ndarray:
         """Return which of the places, shape (..., 2), are expected to be the target's."""

@@ -49,14 +49,25 @@ class Prediction:
         """Mean way (x, y) of a frame, in pixels."""
         return self._velocity
 
-    def seen(self, center: _Point) -> None:
-        """Take note of where the target is in this frame."""
-        if self._last is not None and not self._misses:
+    def seen(self, center: _Point, merged: bool = False) -> None:
+        """
+        Take note of where the target is in this frame.
+
+        Parameters
+        ----------
+        center : tuple of float
+            Where (x, y) it is.
+        merged : bool
+            Whether another target is in the same place: what is seen there is of both and goes
+            the way of none of them. This one is expected to go on as before.
+
+        """
+        if self._misses:
+            self._velocity = (0.0, 0.0)
+        elif self._last is not None and not merged:
             step = (center[0] - self._last[0], center[1] - self._last[1])
             self._velocity = (self._velocity[0] + _SMOOTHING * (step[0] - self._velocity[0]),
                               self._velocity[1] + _SMOOTHING * (step[1] - self._velocity[1]))
-        elif self._misses:
-            self._velocity = (0.0, 0.0)
         self._last, self._misses = center, 0
 
     def missed(self) -> None:

@@ -133,13 +133,17 @@ def twin_crosses(sequence: TrackingSequence) -> TrackingSequence:
     It comes from afar, on a line that is drawn by chance, by 0.15 sizes a frame faster than the
     target, covers it when it is there, and goes on. The true box stays that of the first one.
     """
+    twin = _Twin(sequence.ground_truth, crossing_offsets(sequence))
+    return replace(sequence, frames=ChangedFrames(
+        sequence, range(len(sequence)), twin, 'twin_crosses'))
+
+
+def crossing_offsets(sequence: TrackingSequence) -> Array:
+    """Return how far (x, y) from the target its copy is in each frame of `twin_crosses`."""
     angle = generator(seed_of(sequence)).uniform(0, 2 * np.pi)
     size = np.nanmedian(np.sqrt(np.prod(sequence.ground_truth[:, 2:], axis=1)))
-    frames = np.arange(len(sequence))
-    way = _CROSSING_SPEED * size * (frames - len(sequence) // 2)
-    offsets = way[:, None] * np.array([np.cos(angle), np.sin(angle)])
-    return replace(sequence, frames=ChangedFrames(
-        sequence, frames.tolist(), _Twin(sequence.ground_truth, offsets), 'twin_crosses'))
+    way = _CROSSING_SPEED * size * (np.arange(len(sequence)) - len(sequence) // 2)
+    return way[:, None] * np.array([np.cos(angle), np.sin(angle)])
 
 
 def _middle(sequence: TrackingSequence, duration: int) -> int:

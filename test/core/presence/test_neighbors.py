@@ -57,6 +57,12 @@ def test_nobody_claims_where_the_target_itself_is_expected(own, others):
     assert not Neighbors(own, others).claim(own, 20.0)
 
 
+@pytest.mark.parametrize('other, merged', [
+    ((19, 10), True), ((21, 10), False), ((10, 1), True), ((10, 10), True), ((18, 18), False)])
+def test_targets_that_get_to_the_same_place_are_merged(other, merged):
+    assert Neighbors((10, 10), ((90, 90), other)).merged(20) is merged
+
+
 class Detector:
     """Sees the next of what it is told to see; near a place, something at that place."""
 

@@ -50,6 +50,27 @@ def test_missed_target_goes_on_and_comes_to_rest():
     assert ways[-1] == pytest.approx(3 / 0.3, rel=0.01)
 
 
+def test_target_in_the_place_of_another_one_goes_on_as_before():
+    prediction = Prediction()
+    box = walk(prediction, (3, -1), 20)
+    before = prediction.velocity
+    for _ in range(5):
+        prediction.seen(box.center, merged=True)
+    assert prediction.velocity == before and prediction.misses == 0
+    # Alone again, it is where it is: the way there is one frame's.
+    prediction.seen((box.center[0] + 13, box.center[1] - 1))
+    assert prediction.velocity[0] == pytest.approx(before[0] + 0.3 * (13 - before[0]))
+
+
+def test_found_target_has_no_motion_of_before_wherever_it_is():
+    for merged in (False, True):
+        prediction = Prediction()
+        box = walk(prediction, (3, -1), 20)
+        prediction.missed()
+        prediction.seen(box.center, merged)
+        assert prediction.velocity == (0.0, 0.0) and prediction.misses == 0
+
+
 def test_stopped_target_does_not_go_on():
     prediction = Prediction()
     box = walk(prediction, (3, -1), 20)

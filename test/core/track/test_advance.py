@@ -163,6 +163,13 @@ def test_others_are_told_with_where_the_target_goes_itself(parts, track):
         (53, 33), ((70, 40), (90, 20)))
 
 
+@pytest.mark.parametrize('other, merged', [((50, 30), True), ((120, 90), False)])
+def test_what_is_seen_in_the_place_of_another_one_is_no_motion(parts, track, other, merged):
+    parts.prediction.velocity = (3.0, -2.0)
+    advance(track, frame(), None, [(120, 20), other])
+    assert parts.prediction.seen.call_args.args[1] is merged
+
+
 def test_nobody_is_where_he_was_expected_after_a_cut(parts, track):
     parts.gain.examine.return_value = CUT
     advance(track, frame(), None, [(70, 40)])
@@ -247,7 +254,7 @@ def test_frame_without_a_cut_forgets_nothing(parts, track):
 def test_believed_target_is_followed(parts, track, verdict):
     parts.monitor.judge.return_value = verdict
     result = advance(track, frame())
-    parts.prediction.seen.assert_called_once_with(pytest.approx((52, 36)))
+    parts.prediction.seen.assert_called_once_with(pytest.approx((52, 36)), False)
     parts.prediction.missed.assert_not_called()
     parts.redetection.restart.assert_called_once_with()
     assert result.box.center == pytest.approx((52, 36)) and result.box.size == START.size
@@ -336,7 +343,7 @@ def test_box_follows_the_measurement_and_the_sample_a_part_of_the_way(parts, tra
     # Edges that are sure to 1 of 14.1 pixels: 1 / (1 + (1 / 14.1 / .2)^2) of the way is learned.
     parts.detector.remember.assert_called_once_with(
         HERE.detection, pytest.approx((52 + 5 / 1.125, 36 - 5 / 1.125)))
-    parts.prediction.seen.assert_called_once_with(pytest.approx((57, 31)))
+    parts.prediction.seen.assert_called_once_with(pytest.approx((57, 31)), False)
 
 
 def test_size_is_kept_where_nothing_is_measured(parts, track):
@@ -372,7 +379,7 @@ def test_size_is_that_of_the_sighting(parts, track):
 def test_target_beyond_the_border_is_followed_to_the_border(parts, track):
     parts.observer.look.return_value = Seen(sighting((130, 36), 2.5))
     advance(track, frame())
-    parts.prediction.seen.assert_called_once_with(pytest.approx((120, 36)))
+    parts.prediction.seen.assert_called_once_with(pytest.approx((120, 36)), False)
 
 
 def test_filter_learns_what_was_seen_and_trains_every_other_frame(parts, track):
@@ -431,7 +438,7 @@ def test_parts_are_made_of_the_first_frame(parts, monkeypatch):
     made['redetection'].assert_called_once_with(
         CONFIG.search, parts.observer, parts.monitor, view, START)
     made['motion'].assert_called_once_with(START)
-    parts.prediction.seen.assert_called_once_with(START.center)
+    parts.prediction.seen.assert_called_once_with(START.center, False)
     parts.observer.keep.assert_called_once_with(view, START)
     parts.detector.watch.assert_called_once_with(view, START)
     assert (track.result.box, track.result.score) == (START, 1.0)
