@@ -24,7 +24,7 @@ from lmsco_ros.core.config import TrackerConfig
 from lmsco_ros.core.detection.detector import Detection, Detector
 from lmsco_ros.core.detection.precision import box_covariance
 from lmsco_ros.core.detection.scale import found_factor, scale_factors
-from lmsco_ros.core.extent.fusion import EdgeFilter
+from lmsco_ros.core.extent.fusion import EdgeFilter, place_to_learn
 from lmsco_ros.core.extent.measurement import ExtentMeter
 from lmsco_ros.core.fourier.localization import centered_map
 from lmsco_ros.core.imaging.gain import AutomaticGain, FrameSurvey
@@ -45,9 +45,6 @@ __all__ = ['Track']
 # How much of the way from its own place to the fused center the filter learns to go: all of it
 # would lead it away with a neighbor that was measured by mistake, nothing would leave it on the
 # part of the target that came into view first.
-# Deviation of the measured edges, in sides of the target, with which the filter goes half of the
-# way from its own center to the fused one.
-_ANCHORING = 0.2
 
 
 class Track:
@@ -198,18 +195,10 @@ class Track:
 
     def _learn(self, sighting: Sighting) -> None:
         """Store the sample; when it is time, train the filter."""
-        self._detector.remember(sighting.detection, self._anchor(sighting))
+        place = place_to_learn(sighting.detection.center, self._box, sighting.measurement)
+        self._detector.remember(sighting.detection, place)
         if self._frame % self._config.learning.update_interval == 0:
             self._detector.train()
-
-    def _anchor(self, sighting: Sighting) -> tuple[float, float]:
-        """Return the place (x, y) to learn: the found one, nearer to the fused one if it is sure."""
-        (x, y), (fused_x, fused_y) = sighting.detection.center, self._box.center
-        if sighting.measurement is None:
-            return x, y
-        unsure = sighting.measurement.deviations.mean(axis=1) / self._box.area**0.5
-        right, down = (1 / (1 + (unsure / _ANCHORING)**2)).tolist()
-        return x + right * (fused_x - x), y + down * (fused_y - y)
 
     def _describe(self, view: FrameView, detection: Detection, score: float,
                   state: TrackState) -> TrackResult:

@@ -22,7 +22,6 @@ import sys
 
 import pytest
 
-from lmsco_ros.core import track
 from lmsco_ros.core.extent import fusion
 from lmsco_ros.core.presence.trust import MEASURED, UNMEASURED
 from lmsco_ros.core.weights.registry import find_source
@@ -109,7 +108,7 @@ def test_constants_of_the_fusion_are_those_of_the_code():
         'drawn': fusion._DRAWN, 'drawn pixels': fusion._DRAWN_PIXELS, 'found': fusion._FOUND,
         'change': fusion._CHANGE,
         'border': fusion._CHANGE_AT_BORDER, 'convention': fusion._CONVENTION,
-        'settling': fusion._SETTLING, 'anchoring': track._ANCHORING}
+        'settling': fusion._SETTLING, 'anchoring': fusion._ANCHORING}
     assert f'{fusion._BORDER_PIXELS} pixels away' in PAGE
     assert f'at least {fusion._SMALLEST_SIDE:g} pixels' in PAGE
 

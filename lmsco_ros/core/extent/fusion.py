@@ -28,7 +28,7 @@ import numpy.typing as npt
 from lmsco_ros.core.extent.measurement import Measurement
 from lmsco_ros.core.types import BoundingBox
 
-__all__ = ['EdgeFilter']
+__all__ = ['EdgeFilter', 'place_to_learn']
 
 _Array = npt.NDArray[np.float64]
 
@@ -47,6 +47,9 @@ _CONVENTION = 8.0
 # Frames in which the whole of a target that came in over the border shows how that is drawn.
 _SETTLING = 40
 _SMALLEST_SIDE = 2.0
+# Deviation of the measured edges, in sides of the target, with which the filter learns half of the
+# way from its own center to the fused one.
+_ANCHORING = 0.2
 
 
 class EdgeFilter:
@@ -101,6 +104,28 @@ class EdgeFilter:
         """Return along which axes edges (2, 2) lie at the border of the image, or beyond it."""
         return ((edges[:, 0] < _BORDER_PIXELS)
                 | (edges[:, 1] > self._limits - _BORDER_PIXELS))
+
+
+def place_to_learn(found: tuple[float, float], fused: BoundingBox,
+                   measured: Measurement | None) -> tuple[float, float]:
+    """
+    Return the place (x, y) that the correlation filter should learn.
+
+    Parameters
+    ----------
+    found : tuple of float
+        Where (x, y) it has found the target, in pixels.
+    fused : BoundingBox
+        The target, with what was measured.
+    measured : Measurement or None
+        Of the network: the surer it is, the nearer is the place to the fused center.
+
+    """
+    if measured is None:
+        return found
+    unsure = measured.deviations.mean(axis=1) / _side(fused)
+    x, y = np.array(found) + (np.array(fused.center) - found) / (1 + (unsure / _ANCHORING)**2)
+    return float(x), float(y)
 
 
 def _beyond(difference: _Array, spared: _Array) -> _Array:
