@@ -42,10 +42,6 @@ from lmsco_ros.core.weights.loading import Networks
 
 __all__ = ['Track']
 
-# How much of the way from its own place to the fused center the filter learns to go: all of it
-# would lead it away with a neighbor that was measured by mistake, nothing would leave it on the
-# part of the target that came into view first.
-
 
 class Track:
     """

@@ -48,7 +48,8 @@ _CONVENTION = 8.0
 _SETTLING = 40
 _SMALLEST_SIDE = 2.0
 # Deviation of the measured edges, in sides of the target, with which the filter learns half of the
-# way from its own center to the fused one.
+# way from its own center to the fused one: all of it would lead it away with a neighbor that was
+# measured by mistake, nothing would leave it on the part of the target that came into view first.
 _ANCHORING = 0.2
 
 
