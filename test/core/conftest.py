@@ -313,6 +313,14 @@ def box_at():
     return lambda center, target=(24.0, 18.0): BoundingBox.from_center(center, target)
 
 
+def drawn(generator, name, shape, spread):
+    """Return random numbers of an array; normalizations change the spread of nothing much."""
+    numbers = generator.normal(0, spread, shape)
+    if name.endswith(('norm.weight', 'running_var')):
+        numbers = 0.5 + np.abs(numbers)
+    return numbers.astype(np.float32)
+
+
 @pytest.fixture(scope='session')
 def random_network():
     """Return a function of a network class to a network with random weights, always the same."""
@@ -321,7 +329,7 @@ def random_network():
         arrays = {}
         for name, shape in architecture.file_shapes().items():
             spread = (2 / np.prod(shape[1:]))**0.5 if len(shape) > 1 else 0.1
-            arrays[name] = generator.normal(0, spread, shape).astype(np.float32)
+            arrays[name] = drawn(generator, name, shape, spread)
         return architecture.from_arrays(arrays)
     return make
 
@@ -346,6 +354,6 @@ def random_arrays():
                 arrays[name] = np.array([90, 120, 140], np.float32)
             else:
                 spread = (2 / np.prod(shape[1:]))**0.5 if len(shape) > 1 else 0.5
-                arrays[name] = generator.normal(0, spread, shape).astype(np.float32)
+                arrays[name] = drawn(generator, name, shape, spread)
         return arrays
     return lambda architecture: dict(make(architecture))

@@ -43,12 +43,15 @@ class ImageNetwork(Backbone):
     ----------
     mean : tuple of float
         What was subtracted from the channels in training, where a file of weights does not say.
+    deviation : tuple of float
+        What the channels were divided by then.
     stages : mapping of str to sequence of modules
         What leads from each layer to the next, named as `layers` are and in their order.
 
     """
 
     mean: ClassVar[tuple[float, float, float]]
+    deviation: ClassVar[tuple[float, float, float]] = (1.0, 1.0, 1.0)
     stages: Mapping[str, Sequence[torch.nn.Module]]
 
     @classmethod
@@ -68,8 +71,9 @@ class ImageNetwork(Backbone):
     @classmethod
     def _state(cls, arrays: Mapping[str, np.ndarray]) -> Mapping[str, np.ndarray]:
         """Return the state with `conv1` folded for gray images."""
-        weight, bias = fold_gray(arrays['conv1.weight'], arrays['conv1.bias'], arrays['mean'],
-                                 _FULL_SCALE)
+        weight, bias = fold_gray(
+            arrays['conv1.weight'] / np.array(cls.deviation)[:, None, None], arrays['conv1.bias'],
+            arrays['mean'], _FULL_SCALE)
         state = {**arrays, 'conv1.weight': weight, 'conv1.bias': bias}
         del state['mean']
         return state

@@ -19,7 +19,8 @@ from __future__ import annotations
 import numpy as np
 import torch
 
-__all__ = ['LocalResponseNorm', 'convolve', 'fold_gray', 'fold_mean', 'pool', 'standardize']
+__all__ = ['LocalResponseNorm', 'convolve', 'fold_gray', 'fold_mean', 'fold_normalization',
+           'pool', 'standardize']
 
 _CACHED_NUMBERS = 1 << 17
 _CONTRAST_FLOOR = 0.02
@@ -113,6 +114,32 @@ def fold_gray(weight: np.ndarray, bias: np.ndarray, mean: np.ndarray,
     """
     summed = scale * weight.astype(np.float64).sum(axis=1, keepdims=True)
     return summed.astype(np.float32), fold_mean(weight, bias, mean)
+
+
+def fold_normalization(weight: np.ndarray, factor: np.ndarray, shift: np.ndarray,
+                       mean: np.ndarray, variance: np.ndarray,
+                       epsilon: float) -> tuple[np.ndarray, np.ndarray]:
+    """
+    Return the convolution that needs no normalization of the batch behind it.
+
+    Parameters
+    ----------
+    weight : ndarray, shape (out, in, kh, kw)
+        Kernels of a convolution without bias.
+    factor, shift, mean, variance : ndarray, shape (out,)
+        Of the normalization factor (x - mean) / sqrt(variance + epsilon) + shift.
+    epsilon : float
+        Added to the variance.
+
+    Returns
+    -------
+    weight : ndarray, shape (out, in, kh, kw), float32
+    bias : ndarray, shape (out,), float32
+
+    """
+    gain = factor.astype(np.float64) / np.sqrt(variance.astype(np.float64) + epsilon)
+    bias = shift - gain * mean
+    return ((weight * gain[:, None, None, None]).astype(np.float32), bias.astype(np.float32))
 
 
 def standardize(images: torch.Tensor) -> torch.Tensor:

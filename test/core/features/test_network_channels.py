@@ -25,7 +25,10 @@ import torch
 from lmsco_ros.core.backend import Backend
 from lmsco_ros.core.errors import ConfigError
 from lmsco_ros.core.features.network_channels import NetworkChannels
+from lmsco_ros.core.networks.efficientnet_lite import EfficientNetLite0
+from lmsco_ros.core.networks.inverted_residual import InvertedResidual
 from lmsco_ros.core.networks.layers import LocalResponseNorm
+from lmsco_ros.core.networks.mobilenet_v2 import MobileNetV2
 from lmsco_ros.core.networks.motion_cnn import MotionCNN
 from lmsco_ros.core.networks.squeezenet import SqueezeNet
 from lmsco_ros.core.networks.thermal import ThermalFlowNet, ThermalNet
@@ -34,7 +37,9 @@ from lmsco_ros.core.networks.vgg_m import VGGM
 NUMPY = Backend(numpy_namespace, 'cpu')
 NETWORKS = [(ThermalNet, 'appearance', 'features', 4), (ThermalFlowNet, 'motion', 'features', 4),
             (VGGM, 'appearance', 'conv5', 16), (VGGM, 'appearance', 'conv1', 4),
-            (SqueezeNet, 'appearance', 'fire5', 8), (MotionCNN, 'motion', 'conv5', 16)]
+            (SqueezeNet, 'appearance', 'fire5', 8), (MotionCNN, 'motion', 'conv5', 16),
+            (MobileNetV2, 'appearance', 'block6', 8),
+            (EfficientNetLite0, 'appearance', 'block3', 4)]
 
 
 def inputs(rng, kind, count, size):
@@ -96,8 +101,10 @@ def position_network(architecture, random_network):
             module.weight.data.fill_(1 / module.weight[0].numel())
             module.bias.data.zero_()
     network._prepare = lambda images: images
+    for block in (part for part in network.modules() if isinstance(part, InvertedResidual)):
+        block.shortcut, block.rectify = False, torch.nn.ReLU()
     plain = {torch.nn.MaxPool2d: torch.nn.AvgPool2d(3, 2, ceil_mode=True, count_include_pad=False),
-             LocalResponseNorm: torch.nn.Identity()}
+             LocalResponseNorm: torch.nn.Identity(), torch.nn.ReLU6: torch.nn.ReLU()}
     network.stages = {name: [plain.get(type(module), module) for module in stage]
                       for name, stage in getattr(network, 'stages', {}).items()}
     return network
@@ -106,7 +113,8 @@ def position_network(architecture, random_network):
 @pytest.mark.parametrize('axis', [1, 2])
 @pytest.mark.parametrize('architecture, kind', [
     (ThermalNet, 'appearance'), (ThermalFlowNet, 'motion'), (VGGM, 'appearance'),
-    (SqueezeNet, 'appearance'), (MotionCNN, 'motion')])
+    (SqueezeNet, 'appearance'), (MotionCNN, 'motion'), (MobileNetV2, 'appearance'),
+    (EfficientNetLite0, 'appearance')])
 def test_cells_look_at_their_own_squares(random_network, architecture, kind, axis):
     """To within half a cell of the layer, whatever margin the network needs."""
     network, size = position_network(architecture, random_network), 208

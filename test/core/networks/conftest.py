@@ -113,8 +113,68 @@ def squeezenet(image, arrays):
     return found
 
 
+def normalized(features, arrays, name, epsilon, padding=(0, 0), **geometry):
+    """Return a convolution without bias of a file, on padded features, and its normalization."""
+    features = np.pad(features, ((0, 0), padding, padding))
+    weight = arrays[f'{name}.weight'].astype(float)
+    result = convolve(features, weight, np.zeros(len(weight)), **geometry)
+    factor, shift, mean, variance = (
+        arrays[f'{name}.norm.{part}'].astype(float)[:, None, None]
+        for part in ('weight', 'bias', 'running_mean', 'running_var'))
+    return factor * (result - mean) / np.sqrt(variance + epsilon) + shift
+
+
+def relu6(features):
+    """Return the features, limited to 0..6."""
+    return np.clip(features, 0, 6)
+
+
+def inverted_residuals(image, arrays, groups, epsilon, zeros, deviation):
+    """
+    Return all layers of a network of inverted residuals.
+
+    `groups` are (expansion, channels, number, stride, kernel) as the papers list them; `zeros`
+    gives the padding before and behind for a kernel and a stride.
+    """
+    seen = color(image, arrays['mean']) / np.array(deviation)[:, None, None]
+    features = relu6(normalized(seen, arrays, 'conv1', epsilon, stride=2))
+    found = {'conv1': features}
+    for expansion, channels, number, first_stride, kernel in groups:
+        for stride in [first_stride] + [1] * (number - 1):
+            name, given = f'block{len(found)}', features
+            if expansion > 1:
+                features = relu6(normalized(features, arrays, f'{name}.expand', epsilon))
+            features = relu6(normalized(
+                features, arrays, f'{name}.depthwise', epsilon, zeros(kernel, stride),
+                stride=stride, groups=len(features)))
+            features = normalized(features, arrays, f'{name}.project', epsilon)
+            if stride == 1 and len(given) == channels:
+                features = features + given
+            found[name] = features
+    return found
+
+
+def mobilenet_v2(image, arrays):
+    """Return all layers of MobileNetV2, table 2 of its paper; padded as by torchvision."""
+    groups = ((1, 16, 1, 1, 3), (6, 24, 2, 2, 3), (6, 32, 3, 2, 3), (6, 64, 4, 2, 3),
+              (6, 96, 3, 1, 3))
+    deviation = 255 * np.array([0.229, 0.224, 0.225])
+    return inverted_residuals(image, arrays, groups, 1e-5, lambda kernel, stride: (1, 1),
+                              deviation)
+
+
+def efficientnet_lite0(image, arrays):
+    """Return all layers of EfficientNet-Lite0, table 1 of its paper; padded as by TensorFlow."""
+    groups = ((1, 16, 1, 1, 3), (6, 24, 2, 2, 3), (6, 40, 2, 2, 5), (6, 80, 3, 2, 3),
+              (6, 112, 3, 1, 5))
+    zeros = {(3, 1): (1, 1), (3, 2): (0, 1), (5, 1): (2, 2), (5, 2): (1, 2)}
+    return inverted_residuals(image, arrays, groups, 1e-3,
+                              lambda *geometry: zeros[geometry], [128.0] * 3)
+
+
 @pytest.fixture(scope='session')
 def slow_layers():
     """Return a function of network class, image (C, H, W) and arrays of a file to all layers."""
-    slow = {'VGGM': vgg_m, 'MotionCNN': motion_cnn, 'SqueezeNet': squeezenet}
+    slow = {'VGGM': vgg_m, 'MotionCNN': motion_cnn, 'SqueezeNet': squeezenet,
+            'MobileNetV2': mobilenet_v2, 'EfficientNetLite0': efficientnet_lite0}
     return lambda architecture, image, arrays: slow[architecture.__name__](image, arrays)

