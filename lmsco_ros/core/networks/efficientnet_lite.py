@@ -45,7 +45,8 @@ class EfficientNetLite0(InvertedResidualNetwork):
         """Return the names of the PyTorch port, which counts the blocks from 0."""
         found = {'conv1': ('_conv_stem', '_bn0')}
         for number, (name, block) in enumerate(cls.plan.items()):
-            found.update({f'{name}.{part}': tuple(f'_blocks.{number}._{other}' for other in pair)
-                          for part, pair in _PARTS.items()
+            within = f'_blocks.{number}._'
+            found.update({f'{name}.{part}': (within + convolution, within + normalization)
+                          for part, (convolution, normalization) in _PARTS.items()
                           if part != 'expand' or block.expansion > 1})
         return found

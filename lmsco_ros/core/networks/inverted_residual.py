@@ -211,8 +211,8 @@ class InvertedResidualNetwork(ImageNetwork):
         state = {'mean': arrays['mean']}
         for name in cls.published():
             weight, bias = fold_normalization(
-                arrays[f'{name}.weight'], *(arrays[f'{name}.norm.{part}']
-                                            for part in _NORMALIZATION), cls.epsilon)
+                arrays[f'{name}.weight'],
+                [arrays[f'{name}.norm.{part}'] for part in _NORMALIZATION], cls.epsilon)
             state[f'{name}.weight'], state[f'{name}.bias'] = weight, bias
         return super()._state(state)
 

@@ -16,6 +16,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 import torch
 
@@ -116,8 +118,7 @@ def fold_gray(weight: np.ndarray, bias: np.ndarray, mean: np.ndarray,
     return summed.astype(np.float32), fold_mean(weight, bias, mean)
 
 
-def fold_normalization(weight: np.ndarray, factor: np.ndarray, shift: np.ndarray,
-                       mean: np.ndarray, variance: np.ndarray,
+def fold_normalization(weight: np.ndarray, normalization: Sequence[np.ndarray],
                        epsilon: float) -> tuple[np.ndarray, np.ndarray]:
     """
     Return the convolution that needs no normalization of the batch behind it.
@@ -126,8 +127,8 @@ def fold_normalization(weight: np.ndarray, factor: np.ndarray, shift: np.ndarray
     ----------
     weight : ndarray, shape (out, in, kh, kw)
         Kernels of a convolution without bias.
-    factor, shift, mean, variance : ndarray, shape (out,)
-        Of the normalization factor (x - mean) / sqrt(variance + epsilon) + shift.
+    normalization : sequence of ndarray, shape (out,)
+        Factor, shift, mean and variance of factor (x - mean) / sqrt(variance + epsilon) + shift.
     epsilon : float
         Added to the variance.
 
@@ -137,6 +138,7 @@ def fold_normalization(weight: np.ndarray, factor: np.ndarray, shift: np.ndarray
     bias : ndarray, shape (out,), float32
 
     """
+    factor, shift, mean, variance = normalization
     gain = factor.astype(np.float64) / np.sqrt(variance.astype(np.float64) + epsilon)
     bias = shift - gain * mean
     return ((weight * gain[:, None, None, None]).astype(np.float32), bias.astype(np.float32))

@@ -122,7 +122,7 @@ def test_folded_normalization_changes_nothing(rng):
         ('weight', factor), ('bias', shift), ('running_mean', mean), ('running_var', variance))},
         strict=False)
     convolution = torch.nn.functional.conv2d(torch.from_numpy(images), torch.from_numpy(weight))
-    folded, bias = fold_normalization(weight, factor, shift, mean, variance, 0.05)
+    folded, bias = fold_normalization(weight, (factor, shift, mean, variance), 0.05)
     assert folded.dtype == bias.dtype == np.float32
     found = torch.nn.functional.conv2d(*(torch.from_numpy(a.astype(float))
                                          for a in (images, folded, bias)))
