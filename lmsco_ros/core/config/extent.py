@@ -52,18 +52,26 @@ class ScaleConfig:
         Ratio of two neighboring scales.
     exponent_min, exponent_max : int
         Range of the exponents of `step`; the last size alone with 0 and 0.
+    calibrated : bool
+        Whether scores count by how they depend on the scale of the first frame's target, which
+        so keeps its size; without it the highest score wins, as in the paper.
+    rate : float
+        Part of a change of scale that the size follows from one frame to the next.
 
     """
 
     step: float = 1.03
     exponent_min: int = 0
     exponent_max: int = 0
+    calibrated: bool = True
+    rate: float = 0.5
 
     def __post_init__(self) -> None:
         """Check the ranges."""
         check_range(self, 'step', 1, 2, open_low=True)
         check_range(self, 'exponent_min', -50, 0)
         check_range(self, 'exponent_max', 0, 50)
+        check_range(self, 'rate', 0, 1, open_low=True)
         reach = self.step**max(self.exponent_max, -self.exponent_min)
         if reach > _LARGEST_SCALE:
             raise ConfigError(f'ScaleConfig.step and its exponents reach a factor of {reach:g} '

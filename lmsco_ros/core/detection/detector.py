@@ -23,6 +23,7 @@ import numpy as np
 
 from lmsco_ros.core.backend import Array, Backend, to_numpy
 from lmsco_ros.core.config import TrackerConfig
+from lmsco_ros.core.detection.scale import scale_factors, score_slope
 from lmsco_ros.core.errors import ImageError
 from lmsco_ros.core.features.extractor import FeatureExtractor
 from lmsco_ros.core.features.motion import MotionObserver
@@ -123,6 +124,14 @@ class Detector:
         self._motion = MotionObserver(config.motion) if networks.motion is not None else None
         self._operator = self._learn_first(view, box, backend)
         self._first_filters = [1 * block for block in self._operator.filters]
+        self._scale_slope = 0.0
+        self._first_scales: list[Array] = []
+        if config.scale.calibrated and len(scale_factors(config.scale)) > 1:
+            step = config.scale.step
+            self._first_scales = self._extractor(np.stack([
+                self._patch(view, region_around(box.scaled(factor), config.sampling))
+                for factor in (1 / step, step)]))
+            self._calibrate()
 
     def __call__(self, view: FrameView, box: BoundingBox,
                  factors: Sequence[float] = (1.0,)) -> Detection:
@@ -150,7 +159,8 @@ class Detector:
             patches, self._moving(regions, patches, factors))
         scores = self._operator.scores(samples)
         grid = grid_size(int(scores.shape[1]) - 1)
-        peak = locate(scores, grid, self._config.sampling.newton_steps)
+        gains = [factor**-self._scale_slope for factor in factors]
+        peak = locate(scores, grid, self._config.sampling.newton_steps, gains)
         best = peak.scale_index
         sharpness = peak_to_sidelobe_ratio(
             peak.grid, round(grid / (2 * self._config.sampling.search_factor)))
@@ -219,6 +229,8 @@ class Detector:
     def train(self) -> None:
         """Adapt the filter to the samples."""
         self._operator.train()
+        if self._first_scales:
+            self._calibrate()
 
     def _learn_first(self, view: FrameView, box: BoundingBox,
                      backend: Backend) -> StructuredOperator:
@@ -231,6 +243,14 @@ class Detector:
         target = (box.height / region.height, box.width / region.width)
         sample = [block[:, :, 0, :] for block in self._extractor(patch[None])]
         return StructuredOperator(self._config.learning, sample, target, backend)
+
+    def _calibrate(self) -> None:
+        """See how the score of the first frame's target depends on the scale by now."""
+        scores = self._operator.scores(self._first_scales)
+        grid = grid_size(int(scores.shape[1]) - 1)
+        smaller, larger = locate(
+            scores, grid, self._config.sampling.newton_steps).scale_values
+        self._scale_slope = score_slope(self._config.scale.step, float(smaller), float(larger))
 
     def _patch(self, view: FrameView, region: BoundingBox) -> np.ndarray:
         """Return the patch of a search region."""

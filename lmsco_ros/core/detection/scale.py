@@ -16,11 +16,16 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from lmsco_ros.core.config import ScaleConfig
 
-__all__ = ['found_factor', 'scale_factors']
+__all__ = ['found_factor', 'scale_factors', 'score_slope']
+
+# Of the other score; the logarithm of what is less says nothing of the scale.
+_LEAST_SHARE = 0.01
 
 
 def scale_factors(config: ScaleConfig) -> tuple[float, ...]:
@@ -28,22 +33,46 @@ def scale_factors(config: ScaleConfig) -> tuple[float, ...]:
     return tuple(config.step**n for n in range(config.exponent_min, config.exponent_max + 1))
 
 
+def score_slope(step: float, smaller: float, larger: float) -> float:
+    """
+    Return d log(score) / d log(factor) at the size in which a filter was trained.
+
+    The score falls off to both sides of that size, but is not highest there: with the size of the
+    region the target and its surroundings change their shares. Scores times factor^-slope are
+    highest at the right size.
+
+    Parameters
+    ----------
+    step : float
+        Ratio of two neighboring scales.
+    smaller, larger : float
+        Scores of the same target one scale below and one above its size.
+
+    """
+    least = _LEAST_SHARE * max(smaller, larger, _LEAST_SHARE)
+    return math.log(max(larger, least) / max(smaller, least)) / (2 * math.log(step))
+
+
 def found_factor(config: ScaleConfig, values: np.ndarray) -> float:
     """
-    Return the scale of the target, refined between the scales that were searched.
+    Return the scale that the size follows to, part of the way to that of the target.
+
+    That is refined between the scales that were searched. The errors of one frame are learned
+    with its sample and so become the size of the next: part of them is as much less.
 
     Parameters
     ----------
     config : ScaleConfig
         The scales.
     values : ndarray, shape (n,)
-        Best score at each; one, of a search at the last size, says nothing of the scale.
+        Best score at each, calibrated; one, of a search at the last size, says nothing of the scale.
 
     """
     if len(values) == 1:
         return 1.0
     best = int(np.argmax(values))
-    return float(config.step**(config.exponent_min + best + _parabola_offset(values, best)))
+    exponent = config.exponent_min + best + _parabola_offset(values, best)
+    return float(config.step**(config.rate * exponent))
 
 
 def _parabola_offset(values: np.ndarray, best: int) -> float:

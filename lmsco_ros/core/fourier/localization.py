@@ -16,6 +16,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 import math
@@ -41,13 +42,13 @@ class Peak:
     displacement : tuple of float
         (dy, dx) in periods, in [-1/2, 1/2).
     scale_index : int
-        Scale whose score is the highest.
+        Scale whose maximum is the highest.
     value : float
         Score at the maximum.
     grid : ndarray, shape (n, n)
         Scores of that scale on the grid; the origin is at [0, 0].
     scale_values : ndarray, shape (n_scales,)
-        Highest score of each scale on the grid.
+        Maximum of each scale, times its gain.
 
     """
 
@@ -58,9 +59,10 @@ class Peak:
     scale_values: np.ndarray
 
 
-def locate(scores: Array, grid_points: int, newton_steps: int) -> Peak:
+def locate(scores: Array, grid_points: int, newton_steps: int,
+           gains: Sequence[float] = (1.0,)) -> Peak:
     """
-    Find the best scale and the position of its maximum (paper, (1)).
+    Find the maximum of each scale, and the best scale (paper, (1)).
 
     Parameters
     ----------
@@ -70,14 +72,20 @@ def locate(scores: Array, grid_points: int, newton_steps: int) -> Peak:
         Points per axis of the coarse search, at least 2K + 1.
     newton_steps : int
         Steps of the refinement.
+    gains : sequence of float
+        What the maxima count for in the choice of the scale; one for all, or one for each.
 
     """
-    grids = to_numpy(synthesize(scores, grid_points))
-    row, column, scale = np.unravel_index(np.argmax(grids), grids.shape)
-    start = (float(row) / grid_points, float(column) / grid_points)
-    displacement, value = refine(to_numpy(scores[..., int(scale)]), start, newton_steps)
-    wrapped = (_wrap(displacement[0]), _wrap(displacement[1]))
-    return Peak(wrapped, int(scale), value, grids[..., scale], grids.max(axis=(0, 1)))
+    grids, series = to_numpy(synthesize(scores, grid_points)), to_numpy(scores)
+    rows, columns = np.unravel_index(
+        grids.reshape(-1, grids.shape[2]).argmax(axis=0), grids.shape[:2])
+    # A grid meets the maximum of one scale nearer than that of another.
+    found = [refine(series[..., scale], (row / grid_points, column / grid_points), newton_steps)
+             for scale, (row, column) in enumerate(zip(rows.tolist(), columns.tolist()))]
+    values = np.array([value for _, value in found]) * gains
+    scale = int(values.argmax())
+    (y, x), value = found[scale]
+    return Peak((_wrap(y), _wrap(x)), scale, value, grids[..., scale], values)
 
 
 def _wrap(t: float) -> float:

@@ -228,6 +228,8 @@ EFFECTS = (
     Effect('scale.step', 1.05, walk, SEARCH),
     Effect('scale.exponent_min', 0, walk, SEARCH),
     Effect('scale.exponent_max', 0, walk, SEARCH),
+    Effect('scale.calibrated', False, walk, SEARCH),
+    Effect('scale.rate', 1.0, walk, SEARCH),
     Effect('extent.network', 'extent', walk),
     Effect('presence.learn', 'always', verdicts),
     Effect('presence.reference_frames', 3, verdicts),

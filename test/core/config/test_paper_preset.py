@@ -51,7 +51,8 @@ QUOTED = (
 )
 # Where it is silent: ours, for a reason that the page or the class gives.
 SILENT = {
-    'sampling.newton_steps': 5, 'scale.step': 1.03,
+    'sampling.newton_steps': 5, 'scale.step': 1.03, 'scale.calibrated': True,
+    'scale.rate': 0.5,
     'motion.remove_camera_motion': True, 'motion.least_motion': 0.3,
     'learning.loss': 'unit', 'learning.margin_weight': 1.0, 'learning.label_sigma': 1 / 12,
     'learning.window_minimum': 0.02, 'learning.window_edge': 0.06,

@@ -14,13 +14,15 @@
 
 """The scale at which scores are highest, where they are few, alike or at the border."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from lmsco_ros.core.config import ScaleConfig
 from lmsco_ros.core.detection.scale import found_factor
 
-CONFIG = ScaleConfig(step=1.1, exponent_min=-2, exponent_max=1)
+CONFIG = ScaleConfig(step=1.1, exponent_min=-2, exponent_max=1, rate=1)
 
 
 @pytest.mark.parametrize('scores, exponent', [
@@ -30,8 +32,14 @@ def test_parabola_through_the_best_and_its_neighbors_tells_the_scale(scores, exp
     assert found_factor(CONFIG, np.array(scores, float)) == pytest.approx(1.1**exponent)
 
 
+@pytest.mark.parametrize('rate', [0.1, 0.5])
+def test_size_follows_a_part_of_the_way(rate):
+    values = np.array([0, 1, 3, 5.])
+    assert found_factor(replace(CONFIG, rate=rate), values) == pytest.approx(1.1**rate)
+
+
 def test_better_one_of_two_scales_is_taken():
-    config = ScaleConfig(step=1.1, exponent_min=0, exponent_max=1)
+    config = ScaleConfig(step=1.1, exponent_min=0, exponent_max=1, rate=1)
     assert found_factor(config, np.array([0.4, 0.7])) == pytest.approx(1.1)
     assert found_factor(config, np.array([0.7, 0.4])) == 1.0
 

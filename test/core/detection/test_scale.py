@@ -18,9 +18,9 @@ import numpy as np
 import pytest
 
 from lmsco_ros.core.config import ScaleConfig
-from lmsco_ros.core.detection.scale import found_factor, scale_factors
+from lmsco_ros.core.detection.scale import found_factor, scale_factors, score_slope
 
-SEARCHED = ScaleConfig(step=1.1, exponent_min=-2, exponent_max=3)
+SEARCHED = ScaleConfig(step=1.1, exponent_min=-2, exponent_max=3, rate=1)
 
 
 def parabola(peak):
@@ -53,3 +53,22 @@ def test_equal_scores_give_the_smallest_scale_unrefined():
 
 def test_one_score_says_nothing_of_the_scale():
     assert found_factor(SEARCHED, np.array([0.4])) == 1.0
+
+
+@pytest.mark.parametrize('slope', [-1.2, 0.0, 0.7])
+def test_slope_is_that_at_the_size_of_the_target(slope):
+    """Of a score that falls off to both sides, whatever its height."""
+    def score(factor):
+        return 0.3 * np.exp(slope * np.log(factor) - 4 * np.log(factor)**2)
+    found = score_slope(SEARCHED.step, score(1 / SEARCHED.step), score(SEARCHED.step))
+    assert found == pytest.approx(slope)
+    # What counts by it is highest at the right size, in this frame and in one of another size.
+    factors = np.array(scale_factors(SEARCHED))
+    for size in (1.0, 1.1**1.4):
+        calibrated = score(factors / size) * factors**-found
+        assert found_factor(SEARCHED, calibrated) == pytest.approx(size, rel=1e-3)
+
+
+@pytest.mark.parametrize('smaller, larger', [(-0.1, 0.6), (0.6, 0.0), (-1.0, -2.0)])
+def test_slope_of_scores_that_are_none_is_finite(smaller, larger):
+    assert abs(score_slope(1.1, smaller, larger)) < 30

@@ -77,6 +77,27 @@ def test_best_scale_wins():
     assert peak.value == pytest.approx(1.1, abs=1e-9)
 
 
+def test_scale_is_chosen_after_the_refinement():
+    """The grid meets the lower one exactly, and the higher one between its points."""
+    scores = np.stack([analyze(bump(9, center, sharpness=1.5, height=height))
+                       for center, height in (((0.0, 0.0), 1.0), ((1 / 18, 1 / 18), 1.04))], axis=2)
+    grids = synthesize(scores, 9)
+    assert grids[..., 0].max() > grids[..., 1].max()
+    peak = locate(scores, 9, 5)
+    assert peak.scale_index == 1 and peak.value > 1.02
+    np.testing.assert_allclose(peak.grid, grids[..., 1])
+    assert peak.scale_values[1] == pytest.approx(peak.value) and peak.scale_values[0] >= 1 - 1e-9
+    # Without it the grid decides.
+    assert locate(scores, 9, 0).scale_index == 0
+
+
+def test_gains_count_in_the_choice_but_not_in_the_value():
+    scores = np.stack([analyze(bump(41, (0.1, 0.2), height=h)) for h in (0.7, 1.0)], axis=2)
+    peak = locate(scores, 41, 5, [2.0, 1.0])
+    assert peak.scale_index == 0 and peak.value == pytest.approx(0.7)
+    np.testing.assert_allclose(peak.scale_values, [1.4, 1.0])
+
+
 def test_no_newton_steps_is_the_grid_maximum(rng):
     series = analyze(rng.normal(size=(9, 9)))
     grid = synthesize(series, 9)
