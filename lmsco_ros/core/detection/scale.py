@@ -57,8 +57,8 @@ def found_factor(config: ScaleConfig, values: np.ndarray) -> float:
     """
     Return the scale that the size follows to, part of the way to that of the target.
 
-    That is refined between the scales that were searched. The errors of one frame are learned
-    with its sample and so become the size of the next: part of them is as much less.
+    That is refined between the scales that were searched. What is wrong with it is learned with
+    the sample and becomes the next frame's size: in part of the way there is as much less of it.
 
     Parameters
     ----------

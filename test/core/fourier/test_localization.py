@@ -80,7 +80,7 @@ def test_best_scale_wins():
 def test_scale_is_chosen_after_the_refinement():
     """The grid meets the lower one exactly, and the higher one between its points."""
     scores = np.stack([analyze(bump(9, center, sharpness=1.5, height=height))
-                       for center, height in (((0.0, 0.0), 1.0), ((1 / 18, 1 / 18), 1.04))], axis=2)
+                       for center, height in (((0, 0), 1.0), ((1 / 18, 1 / 18), 1.04))], axis=2)
     grids = synthesize(scores, 9)
     assert grids[..., 0].max() > grids[..., 1].max()
     peak = locate(scores, 9, 5)

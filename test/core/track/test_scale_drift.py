@@ -36,7 +36,8 @@ def sizes(config, drawn, seed=5, frames=41):
     for number in range(frames):
         side = drawn(number)
         apart = (np.square(x - CENTER[0]) + 2 * np.square(y - CENTER[1])) / (side / 2)**2
-        image = ground + 90 / (1 + np.exp((8 * (apart - 1)).clip(max=50))) + rng.normal(0, 2, ground.shape)
+        target = 90 / (1 + np.exp((8 * (apart - 1)).clip(max=50)))
+        image = ground + target + rng.normal(0, 2, ground.shape)
         image = image.clip(0, 255).astype(np.uint8)
         box = BoundingBox.from_center(CENTER, (side, side / 2**0.5))
         result = tracker.update(image) if number else tracker.initialize(image, box)
