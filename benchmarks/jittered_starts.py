@@ -24,7 +24,7 @@ are compared with. All get the same starts: the first true box, with its center 
 deviation of 5 % of its sides and its sides by 5 %; what counts are the frames after it. An
 interval over sequences says how far other sequences would differ, one over starts (`--each`) how
 far chance does on this sequence. Differences are paired, and real where their interval does not
-hold 0. Where a part of a sequence cannot take the challenge, the sequence is left out.
+hold 0. A sequence that is too short for the challenge, or without a target, is left out.
 """
 
 from __future__ import annotations
@@ -55,6 +55,7 @@ from lmsco_ros.evaluation.protocols.one_pass import one_pass_figures
 from lmsco_ros.evaluation.report.formatting import interval, number, signed
 from lmsco_ros.evaluation.split import load_split
 from lmsco_ros.evaluation.trackers.configured import ConfiguredTracker
+from lmsco_ros.evaluation.trackers.interface import EvaluatedTracker
 
 COLUMNS = ('configuration', 'success AUC', 'difference', 'normalized precision', 'lost',
            'frames/s')
@@ -137,9 +138,11 @@ def chosen_sequences(options: argparse.Namespace) -> list[TrackingSequence]:
     changed = []
     for sequence in sequences:
         try:
+            # Cut first, or what happens in the middle would happen after the end.
+            sequence = sequence.first(options.frames)
             if options.challenge is not None:
                 sequence = apply_challenge(sequence, options.challenge)
-            changed.append(sequence.first(options.frames))
+            changed.append(sequence)
         except SequenceError as error:
             print(f'{sequence.full_name} is left out: {error}')
     if not changed:
@@ -159,11 +162,10 @@ def jittered(sequence: TrackingSequence, start: int) -> Array:
     return box
 
 
-def run(config: TrackerConfig, sequence: TrackingSequence, starts: int) -> Outcome:
+def run(tracker: EvaluatedTracker, sequence: TrackingSequence, starts: int) -> Outcome:
     """Follow a sequence, whose frames are in memory, from several starts."""
     present = int(np.flatnonzero(~is_absent(sequence.ground_truth))[0])
     success, precision, lost, updates, seconds = [], [], [], 0, 0.0
-    tracker = ConfiguredTracker(config)
     for start in range(starts):
         truth = sequence.ground_truth.copy()
         truth[present] = jittered(sequence, start)
@@ -187,7 +189,7 @@ def compare(trackers: Mapping[str, TrackerConfig], sequences: Sequence[TrackingS
     for sequence in sequences:
         sequence = replace(sequence, frames=DecodedFrames(sequence))
         for name, config in trackers.items():
-            outcomes[name].append(run(config, sequence, starts))
+            outcomes[name].append(run(ConfiguredTracker(config), sequence, starts))
     return outcomes
 
 
@@ -230,17 +232,23 @@ def report(outcomes: Mapping[str, Sequence[Outcome]], sequences: Sequence[Tracki
                        for index, sequence in enumerate(sequences))
 
 
-def main(arguments: Sequence[str] | None = None) -> None:
-    """Print the tables, or write them into a page."""
-    parser = argparse.ArgumentParser(description=__doc__.strip().splitlines()[0])
+def sequence_options(description: str) -> argparse.ArgumentParser:
+    """Return a parser that knows which sequences are meant, and how many starts."""
+    parser = argparse.ArgumentParser(description=description)
     parser.add_argument('dataset', type=Path)
-    parser.add_argument('--trackers', type=Path, required=True)
     parser.add_argument('--split', type=Path)
     parser.add_argument('--part', default='train')
     parser.add_argument('--only', nargs='+', metavar='PATTERN')
     parser.add_argument('--challenge', choices=CHALLENGES)
     parser.add_argument('--frames', type=positive, default=60)
     parser.add_argument('--starts', type=positive, default=3)
+    return parser
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Print the tables, or write them into a page."""
+    parser = sequence_options(__doc__.strip().splitlines()[0])
+    parser.add_argument('--trackers', type=Path, required=True)
     parser.add_argument('--each', action='store_true', help='a table for each sequence')
     parser.add_argument('--page', type=Path)
     parser.add_argument('--name', default='comparison')

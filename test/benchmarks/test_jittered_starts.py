@@ -98,15 +98,15 @@ def test_starts_are_off_by_a_twentieth_and_the_same_each_time():
 def test_frames_after_the_start_count_and_the_end_tells_who_is_lost(still):
     """The tracker stands still while the target, after two frames, jumps away."""
     near, far = [20, 20, 20, 20], [55, 35, 20, 20]
-    config = TrackerConfig()
-    stays = run(config, sequence_of([[np.nan] * 4, near, near, near, near]), 2)
+    tracker = Still(TrackerConfig())
+    stays = run(tracker, sequence_of([[np.nan] * 4, near, near, near, near]), 2)
     assert stays.success.shape == (2,) and stays.success.min() > 0.75 and not stays.lost.any()
     assert stays.precision.min() > 0.8 and stays.rate > 0
-    half = run(config, sequence_of([near, near, far]), 2)
+    half = run(tracker, sequence_of([near, near, far]), 2)
     np.testing.assert_array_equal(half.lost, [1, 1])
     assert half.success.max() <= 0.5
     # Where the target is absent at the end, the last frame that shows it tells.
-    away = run(config, sequence_of([near, near, near, [np.nan] * 4]), 2)
+    away = run(tracker, sequence_of([near, near, near, [np.nan] * 4]), 2)
     assert not away.lost.any() and away.success.min() > 0.75
 
 
@@ -128,7 +128,7 @@ def test_all_configurations_get_the_same_starts_and_each_frame_is_decoded_once(s
 def test_a_tracker_that_fails_ends_the_comparison(still, monkeypatch):
     monkeypatch.setattr(still, 'update', lambda self, image: 1 / 0)
     with pytest.raises(SystemExit, match='group/one: frame 1: ZeroDivisionError'):
-        run(TrackerConfig(), sequence_of([[10, 10, 8, 8]] * 4), 1)
+        run(still(TrackerConfig()), sequence_of([[10, 10, 8, 8]] * 4), 1)
 
 
 def outcome(success, lost, rate=100.0):

@@ -65,7 +65,7 @@ def found_factor(config: ScaleConfig, values: np.ndarray) -> float:
     config : ScaleConfig
         The scales.
     values : ndarray, shape (n,)
-        Best score at each, calibrated; one, of a search at the last size, says nothing of the scale.
+        Best score at each, calibrated; one, of a search at the last size, says nothing of it.
 
     """
     if len(values) == 1:
