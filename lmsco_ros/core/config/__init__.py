@@ -16,7 +16,7 @@
 
 from lmsco_ros.core.config.extent import ExtentConfig, ScaleConfig
 from lmsco_ros.core.config.features import (
-    ChannelConfig, FeatureConfig, MotionConfig, NETWORK_KINDS, NetworkConfig)
+    ChannelConfig, FeatureConfig, MOTION_KINDS, MotionConfig, NETWORK_KINDS, NetworkConfig)
 from lmsco_ros.core.config.imaging import IntensityConfig, SamplingConfig
 from lmsco_ros.core.config.learning import LearningConfig
 from lmsco_ros.core.config.presence import PresenceConfig
@@ -26,6 +26,6 @@ from lmsco_ros.core.config.tracker import TrackerConfig
 
 __all__ = [
     'ChannelConfig', 'ExtentConfig', 'FeatureConfig', 'IntensityConfig', 'LearningConfig',
-    'MotionConfig', 'NETWORK_KINDS', 'NetworkConfig', 'PresenceConfig', 'RuntimeConfig',
-    'SamplingConfig', 'ScaleConfig', 'SearchConfig', 'TrackerConfig',
+    'MOTION_KINDS', 'MotionConfig', 'NETWORK_KINDS', 'NetworkConfig', 'PresenceConfig',
+    'RuntimeConfig', 'SamplingConfig', 'ScaleConfig', 'SearchConfig', 'TrackerConfig',
 ]

@@ -21,10 +21,14 @@ from dataclasses import dataclass
 from lmsco_ros.core.config.validation import check_choice, check_range, shown
 from lmsco_ros.core.errors import ConfigError
 
-__all__ = ['ChannelConfig', 'FeatureConfig', 'MotionConfig', 'NETWORK_KINDS', 'NetworkConfig']
+__all__ = ['ChannelConfig', 'FeatureConfig', 'MOTION_KINDS', 'MotionConfig', 'NETWORK_KINDS',
+           'NetworkConfig']
 
 NETWORK_KINDS = ('appearance', 'motion')
 """Kinds of channels that are layers of a network."""
+
+MOTION_KINDS = ('motion', 'flow')
+"""Kinds of channels that show motion, and nothing in the first frame."""
 
 
 @dataclass(frozen=True)
@@ -34,9 +38,10 @@ class ChannelConfig:
 
     Attributes
     ----------
-    kind : {'hog', 'intensity', 'appearance', 'motion'}
-        What the channels are; the last two are a layer of the network that
-        `NetworkConfig.appearance_backbone` or `motion_backbone` names.
+    kind : {'hog', 'intensity', 'appearance', 'motion', 'flow'}
+        What the channels are; `appearance` and `motion` are a layer of the network that
+        `NetworkConfig.appearance_backbone` or `motion_backbone` names, `flow` is the optical
+        flow itself.
     weight : float
         Factor on the normalized channels.
     power : float
@@ -55,7 +60,7 @@ class ChannelConfig:
 
     def __post_init__(self) -> None:
         """Check the ranges."""
-        check_choice(self, 'kind', ('hog', 'intensity', *NETWORK_KINDS))
+        check_choice(self, 'kind', ('hog', 'intensity', *NETWORK_KINDS, 'flow'))
         check_range(self, 'weight', 0, 100, open_low=True)
         check_range(self, 'power', 0, 1)
         if bool(self.layer) != (self.kind in NETWORK_KINDS):

@@ -25,7 +25,8 @@ from typing import Any
 import yaml
 
 from lmsco_ros.core.config.extent import ExtentConfig, ScaleConfig
-from lmsco_ros.core.config.features import FeatureConfig, MotionConfig, NetworkConfig
+from lmsco_ros.core.config.features import (
+    FeatureConfig, MOTION_KINDS, MotionConfig, NetworkConfig)
 from lmsco_ros.core.config.imaging import IntensityConfig, SamplingConfig
 from lmsco_ros.core.config.learning import LearningConfig
 from lmsco_ros.core.config.presence import PresenceConfig
@@ -77,7 +78,7 @@ class TrackerConfig:
         if not self.features:
             raise ConfigError('TrackerConfig.features is empty; name at least one block, '
                               'for instance {channels: [{kind: hog}]}')
-        if all(group.kind == 'motion' for block in self.features for group in block.channels):
+        if all(group.kind in MOTION_KINDS for block in self.features for group in block.channels):
             raise ConfigError('TrackerConfig.features has motion channels only, which show '
                               'nothing in the first frame; add a block of appearance, hog or '
                               'intensity')
@@ -91,6 +92,12 @@ class TrackerConfig:
     def cell(self) -> int:
         """Pixels that every block's cell divides; the side of a patch is a multiple of it."""
         return math.lcm(*(block.cell for block in self.features))
+
+    @property
+    def sees_motion(self) -> bool:
+        """Whether a block shows what moves."""
+        return any(group.kind in MOTION_KINDS for block in self.features
+                   for group in block.channels)
 
     @classmethod
     def preset(cls, name: str) -> TrackerConfig:

@@ -85,7 +85,8 @@ def build(kind: type, data: Any, where: str = '') -> Any:
     Raises
     ------
     ConfigError
-        On an unknown key (names the nearest known one) or a value of the wrong type.
+        On an unknown key (names the nearest known one), a missing one without a default, or a
+        value of the wrong type.
 
     """
     if not isinstance(data, Mapping):
@@ -99,6 +100,10 @@ def build(kind: type, data: Any, where: str = '') -> Any:
             near = difflib.get_close_matches(name, known, n=1, cutoff=0.0)
             raise ConfigError(f'unknown key {_join(where, name)!r}; did you mean '
                               f'{near[0]!r}? Known keys: {", ".join(known)}')
+    for field in dataclasses.fields(kind):
+        if field.default is dataclasses.MISSING and field.name not in data:
+            raise ConfigError(f'{where or "the configuration"} is {shown(data)}, without '
+                              f'{field.name!r}, which has no default; give it')
     return kind(**{key: _convert(hints[key], value, _join(where, key))
                    for key, value in data.items()})
 

@@ -121,7 +121,7 @@ class Detector:
         self._config = config
         self._patch_size = patch_size(box.size, config.sampling, config.cell)
         self._extractor = FeatureExtractor(config, networks, self._patch_size, backend)
-        self._motion = MotionObserver(config.motion) if networks.motion is not None else None
+        self._motion = MotionObserver(config.motion) if config.sees_motion else None
         self._operator = self._learn_first(view, box, backend)
         self._first_filters = [1 * block for block in self._operator.filters]
         self._scale_slope = 0.0

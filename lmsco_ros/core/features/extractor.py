@@ -26,6 +26,7 @@ from lmsco_ros.core.backend import Array, array_namespace, Backend
 from lmsco_ros.core.config import ChannelConfig, FeatureConfig, NETWORK_KINDS, TrackerConfig
 from lmsco_ros.core.features.hog import hog
 from lmsco_ros.core.features.intensity_channels import intensity_channels
+from lmsco_ros.core.features.optical_flow import FLOW_CHANNELS, flow_channels
 from lmsco_ros.core.features.projection import Projection
 from lmsco_ros.core.fourier.interpolation import interpolate, interpolation_series
 from lmsco_ros.core.networks.together import Ask, Asking, at_once
@@ -39,7 +40,7 @@ __all__ = ['FeatureExtractor', 'compress', 'hann_window', 'normalize']
 _LEAST_ENERGY = 1e-6
 
 Maps = Mapping[tuple[str, int], Array]
-"""Channels of a network by layer and side of the cells."""
+"""Channels by layer, if they are of a network, and side of the cells."""
 
 
 @dataclass(frozen=True)
@@ -74,6 +75,7 @@ class FeatureExtractor:
         self._backend = backend
         self._blocks = [_make_block(block, size, backend) for block in config.features]
         self._passes = _make_passes(config, networks, size, backend)
+        self._flow_requests = _requests(config, 'flow')
 
     def __call__(self, patches: np.ndarray, flow: np.ndarray | None = None) -> list[Array]:
         """
@@ -103,6 +105,9 @@ class FeatureExtractor:
         for kind, run in self._passes.items():
             if (given := inputs[kind]) is not None:
                 maps[kind] = yield Ask(run.whom, run.together, given)
+        if flow is not None:
+            maps['flow'] = {(layer, cell): flow_channels(flow, cell)
+                            for layer, cell in self._flow_requests}
         return [self._series(block, patches, maps) for block in self._blocks]
 
     def _series(self, block: _Block, patches: np.ndarray, maps: Mapping[str, Maps]
@@ -127,7 +132,7 @@ class FeatureExtractor:
     def _channels(self, group: ChannelConfig, cell: int, patches: np.ndarray,
                   maps: Mapping[str, Maps]) -> Array:
         """Return a group of channels, shape (n, N, N, C)."""
-        if group.kind in NETWORK_KINDS:
+        if group.kind in (*NETWORK_KINDS, 'flow'):
             if group.kind not in maps:
                 return self._silence(group, cell, patches)
             return self._backend.asarray(maps[group.kind][group.layer, cell])
@@ -137,9 +142,10 @@ class FeatureExtractor:
             np.stack([intensity_channels(patch, cell) for patch in patches]))
 
     def _silence(self, group: ChannelConfig, cell: int, patches: np.ndarray) -> Array:
-        """Return the channels of a network that has nothing to look at."""
+        """Return the channels of something that has nothing to look at."""
         cells = patches.shape[1] // cell
-        count = self._passes[group.kind].channels(group.layer)
+        count = (FLOW_CHANNELS if group.kind == 'flow'
+                 else self._passes[group.kind].channels(group.layer))
         return self._backend.asarray(
             np.zeros((len(patches), cells, cells, count), np.float32))
 

@@ -19,7 +19,9 @@ from __future__ import annotations
 import cv2
 import numpy as np
 
-__all__ = ['DenseFlow', 'flow_image', 'global_motion']
+__all__ = ['DenseFlow', 'FLOW_CHANNELS', 'flow_channels', 'flow_image', 'global_motion']
+
+FLOW_CHANNELS = 3
 
 _SCALE = 16.0
 _MIDDLE = 128.0
@@ -122,3 +124,25 @@ def flow_image(flow: np.ndarray) -> np.ndarray:
     magnitude = np.sqrt(np.sum(flow**2, axis=-1, keepdims=True))
     image = np.concatenate([flow, magnitude], axis=-1)
     return np.clip(image * np.float32(_SCALE) + np.float32(_MIDDLE), 0, 255)
+
+
+def flow_channels(images: np.ndarray, cell: int) -> np.ndarray:
+    """
+    Return the flow of each cell, as a part of the largest that flow images hold.
+
+    Parameters
+    ----------
+    images : ndarray, shape (n, S, S, 3), float32
+        Flow images; S is a multiple of `cell`.
+    cell : int
+        Side of a cell in pixels.
+
+    Returns
+    -------
+    ndarray, shape (n, S // cell, S // cell, 3), float32
+        Means of u, v and magnitude.
+
+    """
+    count, size = images.shape[:2]
+    cells = images.reshape(count, size // cell, cell, size // cell, cell, FLOW_CHANNELS)
+    return (cells.mean(axis=(2, 4)) - np.float32(_MIDDLE)) / np.float32(_MIDDLE)

@@ -18,7 +18,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from lmsco_ros.core.backend import Array, Backend
+from lmsco_ros.core.backend import Array, array_namespace, Backend
 from lmsco_ros.core.config import LearningConfig
 from lmsco_ros.core.fourier.series import bandwidth, grid_size
 from lmsco_ros.core.learning.collaborative import CollaborativeOptimizer
@@ -52,6 +52,7 @@ class StructuredOperator:
         self._memory = SampleMemory(config.memory_size, config.learning_rate,
                                     [block.shape for block in sample], backend)
         self._memory.add(sample)
+        self._unseen = {index for index, block in enumerate(sample) if not _shows(block)}
         side = (target[0] * target[1])**0.5
         label = gaussian_label(grid_size(self._memory.order), (config.label_sigma * side,) * 2)
         series = window_series(target, config.window_minimum, config.window_edge,
@@ -85,8 +86,18 @@ class StructuredOperator:
         return score(samples, self.filters)
 
     def remember(self, sample: Sequence[Array]) -> None:
-        """Add a training sample, the target at the origin."""
+        """
+        Add a training sample, the target at the origin.
+
+        Where a block shows something for the first time, as motion is in no first frame, the
+        filters are trained at once and as long as in the first frame: by the few steps of an
+        update it would get what the others leave.
+        """
         self._memory.add(sample)
+        seen = {index for index in self._unseen if _shows(sample[index])}
+        if seen:
+            self._unseen -= seen
+            self._optimizer.optimize(self._config.initial_iterations, self._config.gradient_steps)
 
     def train(self) -> None:
         """Adapt the filters to the samples in memory."""
@@ -95,3 +106,8 @@ class StructuredOperator:
     def objective(self) -> float:
         """Return the objective of the training problem at the current filters."""
         return self._optimizer.objective()
+
+
+def _shows(block: Array) -> bool:
+    """Return whether a block is not zero."""
+    return bool(array_namespace(block).any(block != 0))

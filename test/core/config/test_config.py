@@ -164,6 +164,22 @@ def test_unknown_key_names_the_nearest(data, path, nearest):
         TrackerConfig.from_dict(data)
 
 
+@pytest.mark.parametrize('data, where, missing', [
+    ({'features': [{}]}, r'features\[0\] is {}', 'channels'),
+    ({'features': [{'channels': [{'weight': 2}]}]}, r'features\[0\].channels\[0\] is', 'kind')])
+def test_missing_key_without_a_default_is_named(data, where, missing):
+    with pytest.raises(ConfigError, match=f"{where}.*, without '{missing}'"):
+        TrackerConfig.from_dict(data)
+
+
+def test_flow_alone_shows_nothing_in_the_first_frame():
+    with pytest.raises(ConfigError, match='motion channels only'):
+        TrackerConfig.from_dict({'features': [{'channels': [{'kind': 'flow'}]}]})
+    assert TrackerConfig.from_dict({'features': [
+        {'channels': [{'kind': 'hog'}]}, {'channels': [{'kind': 'flow'}]}]}).sees_motion
+    assert TrackerConfig.preset('ma').sees_motion and not TrackerConfig.preset('a').sees_motion
+
+
 @given(config=configs, section=st.sampled_from(
     ['learning', 'scale', 'sampling', 'networks', 'motion']),
        position=st.integers(0, 40), letter=st.sampled_from('qzx'))

@@ -113,6 +113,22 @@ def test_patches_do_not_touch_each_other(backend, rng, networks):
             np.testing.assert_allclose(block[:, :, i], single[:, :, 0], atol=1e-5)
 
 
+def test_flow_itself_is_a_group_without_a_network(backend, rng):
+    flow = flows(rng, 2, 36)
+    blocks = (PLAIN, FeatureConfig((ChannelConfig('flow', 2.0),), 4))
+    extract = extractor(backend, 36, *blocks)
+    _, found = extract(textures(rng, 2, 36), flow)
+    for i in range(2):
+        cells = np.array([[flow[i, 4 * y:4 * y + 4, 4 * x:4 * x + 4].mean(axis=(0, 1)) - 128
+                           for x in range(9)] for y in range(9)])
+        channels = 2 * cells / np.sqrt(np.mean(cells**2)) * hann_window(9)[:, :, None]
+        expected = analyze(channels) * interpolation_series(9)[:, :, None]
+        np.testing.assert_allclose(found[:, :, i], expected, atol=1e-5)
+    # Without motion it is silent, as many channels as ever.
+    _, silent = extract(textures(rng, 2, 36))
+    assert silent.shape == found.shape and not to_numpy(silent).any()
+
+
 def test_weight_scales_a_group(backend, rng):
     patches = textures(rng, 1, 36)
     one, two = (extractor(backend, 36, FeatureConfig(

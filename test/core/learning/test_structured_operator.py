@@ -95,3 +95,26 @@ def test_scores_of_several_samples(backend, rng):
     scores = synthesize(operator.scores(stacked), 11)
     for j, sample in enumerate(samples):
         np.testing.assert_allclose(scores[:, :, j], score_map(operator, sample), atol=1e-12)
+
+
+def silent(sample):
+    """Return the sample with nothing to see in its second block."""
+    return [sample[0], 0 * sample[1]]
+
+
+def test_a_block_that_shows_something_for_the_first_time_is_learned_at_once(backend, rng):
+    """As well as where it showed that from the beginning, and only the first time."""
+    first, second, third = (make_sample(rng) for _ in range(3))
+    operator = StructuredOperator(CONFIG, silent(first), TARGET, backend)
+    operator.remember(silent(second))
+    assert not operator.filters[1].any()
+    operator.remember(third)
+    together = score_map(operator, third)
+    assert operator.filters[1].any()
+    alone = together - score_map(operator, silent(third))
+    # Its part of the score, which a few steps from zero would leave to the other block.
+    assert alone[0, 0] > 0.15 * together[0, 0]
+    before = [block.copy() for block in operator.filters]
+    operator.remember(make_sample(rng))
+    for block, old in zip(operator.filters, before, strict=True):
+        np.testing.assert_array_equal(block, old)
