@@ -21,6 +21,7 @@ from dataclasses import dataclass, replace
 from functools import partial
 
 from lmsco_ros.evaluation.challenges.burnt_in_text import text
+from lmsco_ros.evaluation.challenges.camouflage import camouflage
 from lmsco_ros.evaluation.challenges.leaving import leave, leave_edge
 from lmsco_ros.evaluation.challenges.other_view import cut_other_view
 from lmsco_ros.evaluation.challenges.presence import cut, disappear, twin, twin_crosses
@@ -66,6 +67,8 @@ CHALLENGES: Mapping[str, Challenge] = {
                               twin_crosses),
     'twin_remains': Challenge('beside a copy of itself, the target disappears for 30 frames',
                               lambda sequence: disappear(twin(sequence), 1)),
+    'camouflage': Challenge('from a third on, the target has a quarter of its contrast',
+                            camouflage),
     'shutter': Challenge('the picture stands for 12 frames every 60', shutter),
     'gain_jump': Challenge('gain and offset jump every 20 frames', gain_jump),
     'noise_step': Challenge('from a third on, the noise is six times as strong', noise_step),
