@@ -92,7 +92,8 @@ def evaluate(
         help='Make the sequences harder: disappear_1s, disappear_3s, leave, leave_edge, cut, '
              'cut_other_view, twin, twin_crosses, twin_remains, camouflage, shutter, gain_jump, '
              'noise_step, contrast_step, stretch_step, polarity, dead_pixels, telemetry, nan, '
-             'text, sixteen_bit, start_on_background, start_on_noise or all. May be repeated.')] = None,
+             'text, sixteen_bit, start_on_background, start_on_noise or all. '
+             'May be repeated.')] = None,
 ) -> None:
     """Run trackers over a dataset and report accuracy, robustness and speed."""
     with plain_errors():

@@ -329,8 +329,12 @@ def test_motion_is_that_of_the_unscaled_region(make_detector, scene, random_weig
     np.testing.assert_array_equal(patch, frame.patch(region, (84, 84)))
 
 
-def test_motion_takes_part_in_the_score(make_detector, scene, random_weights, motion):
-    detector = make_detector(MOVING, load_networks(MOVING))
+@pytest.mark.parametrize('group', [ChannelConfig('motion', layer='deep'),
+                                   ChannelConfig('motion', layer='shallow'),
+                                   ChannelConfig('flow')], ids=['deep', 'shallow', 'flow'])
+def test_motion_takes_part_in_the_score(make_detector, scene, random_weights, motion, group):
+    config = replace(MOVING, features=(*SMALL.features, FeatureConfig((group,), 4)))
+    detector = make_detector(config, load_networks(config))
     frame = view(scene.frame(CENTER))
     rest = detector(frame, BOX)
     assert not np.any(rest.sample[1])
