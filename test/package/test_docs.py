@@ -113,7 +113,8 @@ def test_ranges_in_the_reference_are_those_of_the_checks():
     page = (DOCS / 'configuration.md').read_text()
     assert re.search(r'\| `margin_weight` \|.*\| \(0, 1e\+06\] \|', page)
     assert re.search(r'\| `update_interval` \|.*\| \[1, 1000\] \|', page)
-    assert re.search(r'\| `kind` \|.*\| `hog`, `intensity`, `appearance`, `motion`, `flow` \|', page)
+    assert re.search(r'\| `kind` \|.*\| `hog`, `intensity`, `appearance`, `motion`, `flow` \|',
+                     page)
     assert re.search(r'\| `uncertain`, `certain` \|.*\| \[`lost`, 1\], \[`uncertain`, 1\] \|',
                      page)
 
