@@ -18,10 +18,11 @@ Fit the coefficients of `lmsco_ros.core.presence.trust`.
     python -m training.trust --data DATA --rendered FOLDER [--frames N]
 
 DATA holds `thermal_dev`, FOLDER what `python -m training.extent.sequences` has written. Every 5th
-clip of the train part, and all rendered sequences, which the extent network never saw, are
-tracked as they are and under the challenges that take the target away, move it, or set another
-one beside it. Printed are the coefficients, and for each challenge the chance that a detection on
-the target is trusted more than one off it.
+clip of the train part, and every 3rd rendered sequence, none of which the extent network ever
+saw, are tracked as they are and under the challenges that take the target away, move it, set
+another one beside it, hide it in noise, or start on nothing. Printed are the coefficients, to be
+copied; how far the probability is from the truth on average; and for each challenge the chance
+that a box on the target is trusted more than one off it.
 """
 
 from __future__ import annotations
@@ -48,18 +49,51 @@ from lmsco_ros.evaluation.challenges import apply_challenge
 from lmsco_ros.evaluation.datasets import scan_dataset, TrackingSequence
 from lmsco_ros.evaluation.errors import EvaluationError, SequenceError
 from lmsco_ros.evaluation.geometry import is_absent
-from lmsco_ros.evaluation.protocols.confidence import auroc, auroc_terms
+from lmsco_ros.evaluation.protocols.calibration import calibration_error, calibration_terms
+from lmsco_ros.evaluation.protocols.confidence import auroc, auroc_terms, GOOD_OVERLAP
 from lmsco_ros.evaluation.split import load_split
 from training.sources import data_folder, SPLIT
 from training.train import CONFIG
 
-CHALLENGES = ('', 'disappear_1s', 'disappear_3s', 'leave', 'cut', 'twin', 'twin_remains',
-              'shutter')
-# A copy of the target cannot be told from it by its looks: judged, but not fitted.
-COPIES = ('twin', 'twin_remains')
-PRESENT_SHARE = 0.9
+CHALLENGES = ('', 'disappear_1s', 'leave', 'leave_edge', 'cut', 'cut_other_view', 'twin_crosses',
+              'shutter', 'noise_step', 'stretch_step', 'start_on_background', 'start_on_noise')
+NOTHING_THERE = ('start_on_background', 'start_on_noise')
+RENDERED_EVERY = 3
+# A box that moved with a detection overlaps it by more.
+_FOLLOWED = 0.3
 
 Array = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Model:
+    """
+    One of the models that are fitted.
+
+    Attributes
+    ----------
+    name : str
+        That of its coefficients.
+    columns : tuple of int
+        Hints that it has.
+    overlap : float
+        What has to be exceeded by a box that is good.
+    unfit : tuple of str
+        Challenges that are not fitted: without edges, nothing tells from a target what stays as
+        it was learned.
+
+    """
+
+    name: str
+    columns: tuple[int, ...]
+    overlap: float
+    unfit: tuple[str, ...] = NOTHING_THERE
+
+
+MODELS = (Model('MEASURED', (0, 1, 2, 3), GOOD_OVERLAP, ()),
+          Model('UNMEASURED', (0, 1), GOOD_OVERLAP),
+          Model('BELIEF_MEASURED', (0, 1, 2, 3), 0.0),
+          Model('BELIEF_UNMEASURED', (0, 1), 0.0))
 
 
 @dataclass(frozen=True)
@@ -69,10 +103,10 @@ class Records:
 
     Attributes
     ----------
-    hints : ndarray, shape (n, 3)
-        What the coefficients multiply: sharpness, likeness, presence.
+    hints : ndarray, shape (n, 4)
+        What the coefficients multiply: sharpness, likeness, presence, vagueness.
     overlap : ndarray, shape (n,)
-        Of the detection with the target; 0 where that is absent.
+        Of the box at the detection with the target; 0 where that is absent.
 
     """
 
@@ -83,15 +117,14 @@ class Records:
 class RecordingTrack(Track):
     """A track that keeps what speaks for the place it looks at first in each frame."""
 
-    seen: tuple[tuple[float, float, float], BoundingBox] | None = None
+    seen: tuple[tuple[float, ...], BoundingBox] | None = None
 
     def _look(self, outlook: Outlook) -> Asking[Sighting]:
         """Return the best detection; keep what the coefficients multiply, and where it is."""
         sighting = yield from super()._look(outlook)
-        evidence = sighting.assessment.evidence
-        hints = regressors(sighting.assessment.quality, evidence.likeness,
-                           evidence.presence or 0.0)
-        self.seen = hints, self._box.moved_to(sighting.detection.center)
+        found = sighting.assessment
+        self.seen = regressors(found.quality, found.likeness, found.evidence.presence,
+                               found.evidence.vagueness), sighting.found
         return sighting
 
 
@@ -106,18 +139,19 @@ def main(arguments: Sequence[str] | None = None) -> None:
         parser.error(f'argument --frames: {options.frames} frames; at least 2 are needed')
     try:
         sequences = [*validation_clips(options.data / 'thermal_dev', options.frames),
-                     *scan_dataset(options.rendered).sequences]
+                     *scan_dataset(options.rendered).sequences[::RENDERED_EVERY]]
     except EvaluationError as error:
         parser.error(str(error))
     limit_threads(1)
     records = {name: list(record_all(sequences, name)) for name in CHALLENGES}
-    everything = [part for name, parts in records.items() if name not in COPIES
+    for model in MODELS:
+        fitted = [part for name, parts in records.items() if name not in model.unfit
                   for part in parts]
-    for label, columns in (('MEASURED', [0, 1, 2]), ('UNMEASURED', [0, 1])):
-        weights = fit(everything, columns)
-        print(label, ' '.join(f'{value:.2f}' for value in weights))
+        weights = fit(fitted, model)
+        print(model.name, ' '.join(f'{value:.2f}' for value in weights),
+              f'calibration error {miscalibration(fitted, model, weights):.3f}')
         for name, parts in records.items():
-            print(f'    {name or "plain":<14}{separation(parts, columns, weights):.3f}')
+            print(f'    {name or "plain":<20}{separation(parts, model, weights):.3f}')
 
 
 def validation_clips(dataset: Path, frames: int) -> list[TrackingSequence]:
@@ -161,9 +195,11 @@ def record(sequence: TrackingSequence, config: TrackerConfig) -> Records:
         at_once(track.advance(survey(image, config.intensity)))
         if track.seen is not None:
             seen, box = track.seen
+            if track.result.box.overlap(box) > _FOLLOWED:
+                box = track.result.box
             hints.append(seen)
             overlaps.append(0.0 if absent[frame] else box.overlap(BoundingBox(*truth[frame])))
-    return Records(np.array(hints).reshape(-1, 3), np.array(overlaps))
+    return Records(np.array(hints).reshape(-1, 4), np.array(overlaps))
 
 
 def _start(config: TrackerConfig, image: npt.NDArray, box: BoundingBox) -> RecordingTrack | None:
@@ -175,36 +211,44 @@ def _start(config: TrackerConfig, image: npt.NDArray, box: BoundingBox) -> Recor
         return None
 
 
-def fit(records: Sequence[Records], columns: Sequence[int]) -> Array:
-    """
-    Return the coefficients of a logistic regression, the constant last.
-
-    Detections with an overlap above 0.5 count against those without any.
-    """
-    hints = np.concatenate([part.hints for part in records])[:, columns]
-    overlap = np.concatenate([part.overlap for part in records])
-    good, bad = overlap > 0.5, overlap == 0
-    weights = good * PRESENT_SHARE / good.sum() + bad * (1 - PRESENT_SHARE) / bad.sum()
+def fit(records: Sequence[Records], model: Model) -> Array:
+    """Return the coefficients of a logistic regression, the constant last."""
+    hints = np.concatenate([part.hints for part in records])[:, model.columns]
+    good = np.concatenate([part.overlap for part in records]) > model.overlap
     inputs = np.c_[hints, np.ones(len(hints))]
 
     def loss(values: Array) -> tuple[float, Array]:
-        odds = inputs @ values
-        slope = weights * (1 / (1 + np.exp(-odds)) - good)
-        ridge = 1e-3 * np.append(values[:-1], 0)
-        return (float(weights @ (np.logaddexp(0, odds) - good * odds) + values @ ridge),
-                slope @ inputs + 2 * ridge)
+        logits = inputs @ values
+        slope = 1 / (1 + np.exp(-logits)) - good
+        ridge = 1e-4 * np.append(values[:-1], 0)
+        return (float((np.logaddexp(0, logits) - good * logits).mean() + values @ ridge),
+                slope @ inputs / len(good) + 2 * ridge)
 
     return minimize(loss, np.zeros(inputs.shape[1]), jac=True).x
 
 
-def separation(records: Sequence[Records], columns: Sequence[int], weights: Array) -> float:
-    """Return the chance that a detection on the target is trusted more than one off it."""
-    kept = [(part.overlap > 0.5) | (part.overlap == 0) for part in records]
-    scores = [part.hints[keep][:, columns] @ weights[:-1]
-              for part, keep in zip(records, kept, strict=True)]
-    terms = auroc_terms(scores, [part.overlap[keep]
-                                 for part, keep in zip(records, kept, strict=True)])
+def separation(records: Sequence[Records], model: Model, weights: Array) -> float:
+    """Return the chance that a good box is trusted more than another one."""
+    terms = auroc_terms([odds(part, model, weights) for part in records], graded(records, model))
     return float(auroc(*terms, np.ones(len(records))))
+
+
+def miscalibration(records: Sequence[Records], model: Model, weights: Array) -> float:
+    """Return how far the probability is from the share of good boxes, on average."""
+    terms = calibration_terms(
+        [1 / (1 + np.exp(-odds(part, model, weights))) for part in records],
+        graded(records, model))
+    return float(calibration_error(terms, np.ones(len(records))))
+
+
+def graded(records: Sequence[Records], model: Model) -> list[Array]:
+    """Return 1 for each good box and 0 for each other one, as the measures take overlaps."""
+    return [(part.overlap > model.overlap).astype(float) for part in records]
+
+
+def odds(records: Records, model: Model, weights: Array) -> Array:
+    """Return the log-odds of each frame."""
+    return np.asarray(records.hints[:, model.columns] @ weights[:-1] + weights[-1])
 
 
 if __name__ == '__main__':

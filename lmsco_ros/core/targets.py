@@ -156,7 +156,7 @@ class Targets:
         frame = read_frame(image)
         self._check(frame, time, self._tracks.values())
         surveyed = survey(frame.pixels, self._config.intensity)
-        headings = {number: track.heading for number, track in self._tracks.items()
+        headings = {number: track.course.heading for number, track in self._tracks.items()
                     if track.result.state is TrackState.TRACKING}
         return side_by_side({
             number: track.advance(surveyed, time, [
@@ -188,7 +188,7 @@ class Targets:
     def _check(self, frame: Frame, time: float | None, tracks: Iterable[Track]) -> None:
         """Refuse a frame of another size or type than those before, or of no fitting time."""
         for track in tracks:
-            track.check_time(time)
+            track.course.check_time(time)
         if frame.kind != self._kind:
             raise ImageError(f'the frame is {frame.kind}, but the target was initialized in '
                              f'{self._kind}; initialize again')

@@ -161,7 +161,7 @@ class TrackResult:
     box : BoundingBox
         Estimated target box; the last trusted one while `state` is LOST.
     score : float
-        Trust in `box`, in [0, 1].
+        Probability that `box` covers the target by more than half, in [0, 1].
     state : TrackState
         TRACKING, UNCERTAIN (found, but not learned from) or LOST.
     confidence_map : ndarray, shape (n, n), float32
@@ -180,10 +180,13 @@ class TrackResult:
         target is seen, and where it has gone on to meanwhile, as far as one can tell, when not.
     velocity_covariance : ndarray, shape (2, 2), or None
         Covariance of `velocity`, in the square of its unit.
+    note : str
+        What else a person should know, in a few words: that nothing stood out where the target
+        was started, as long as it was not TRACKING since. Empty mostly.
 
     Notes
     -----
-    The last four are None only in results that no tracker has made.
+    The four of the motion are None only in results that no tracker has made.
 
     """
 
@@ -196,3 +199,4 @@ class TrackResult:
     covariance: npt.NDArray[np.float64] | None = None
     predicted_box: BoundingBox | None = None
     velocity_covariance: npt.NDArray[np.float64] | None = None
+    note: str = ''

@@ -98,7 +98,7 @@ def _target_status(frame: FrameStatus, outcome: Outcome, number: int,
                    read: Callable[[TrackResult], Readings]) -> FrameStatus:
     """Return the status of one target in a frame."""
     result, start = outcome.results[number], outcome.start
-    message = _MESSAGES[result.state]
+    message = '; '.join(filter(None, (_MESSAGES[result.state], result.note)))
     if number in outcome.dropped:
         message = 'lost for too long: the target is dropped (drop_after)'
     started = start is not None and start.number == number

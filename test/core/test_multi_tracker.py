@@ -17,6 +17,7 @@
 import copy
 from dataclasses import replace
 import pickle
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -219,10 +220,8 @@ class Spy:
     """Stands for a track and keeps what it is told of the others."""
 
     def __init__(self, result, heading, state):
-        self.result, self.heading, self.others = replace(result, state=state), heading, None
-
-    def check_time(self, time):
-        """Any will do."""
+        self.result, self.others = replace(result, state=state), None
+        self.course = SimpleNamespace(heading=heading, check_time=lambda time: None)
 
     def advance(self, surveyed, time, others):
         self.others = others

@@ -22,7 +22,7 @@ from lmsco_ros.core import TrackerConfig
 from lmsco_ros.evaluation.datasets import TrackingSequence
 from lmsco_ros.evaluation.split import load_split
 from training.sources import SPLIT
-from training.trust import fit, main, record, Records, separation
+from training.trust import fit, main, miscalibration, Model, record, Records, separation
 
 ABSENT = range(12, 18)
 
@@ -43,24 +43,43 @@ def sequence(spot):
 def test_record_tells_what_spoke_for_every_frame_after_the_first(sequence):
     records = record(sequence, TrackerConfig.preset('default'))
     absent = np.isin(np.arange(1, 24), ABSENT)
-    assert records.hints.shape == (23, 3) and records.overlap.shape == (23,)
+    assert records.hints.shape == (23, 4) and records.overlap.shape == (23,)
     assert np.all(records.overlap[absent] == 0)
     there = records.overlap > 0.5
     assert there[:11].all()
-    assert np.all(records.hints[absent].max(axis=0) < records.hints[:11].min(axis=0))
+    # The less sharp, alike and present, and the vaguer.
+    good, bad = records.hints[:11], records.hints[absent]
+    assert np.all(bad.max(axis=0)[:3] < good.min(axis=0)[:3])
+    assert bad[:, 3].min() > good[:, 3].max()
+
+
+def model(columns, overlap=0.5):
+    """Return what is to be fitted."""
+    return Model('TEST', columns, overlap)
 
 
 def test_fit_separates_what_can_be_separated():
     rng = np.random.default_rng(3)
-    overlap = np.repeat([0.8, 0.0, 0.3], 100)
-    hints = rng.normal(0, 1, (300, 3))
+    hints = rng.normal(0, 1, (300, 4))
     hints[:100, 1] += 4
-    hints[200:] = 50.0
-    records = [Records(hints, overlap)]
-    weights = fit(records, [0, 1, 2])
-    assert weights[1] > 3 * max(abs(weights[0]), abs(weights[2]))
-    assert separation(records, [0, 1, 2], weights) > 0.98
-    assert separation(records, [0], weights[[0, 3]]) < 0.7
+    records = [Records(hints, np.repeat([0.8, 0.0, 0.3], 100))]
+    both, one = model((0, 1, 2, 3)), model((0,))
+    weights = fit(records, both)
+    assert weights[1] > 3 * np.abs(weights[[0, 2, 3]]).max()
+    assert separation(records, both, weights) > 0.98
+    assert separation(records, one, weights[[0, 4]]) < 0.7
+    assert miscalibration(records, both, weights) < 0.05
+    assert miscalibration(records, both, weights + [0, 0, 0, 0, 6]) > 0.1
+
+
+def test_box_on_a_part_of_the_target_is_good_for_the_belief_alone():
+    hints = np.random.default_rng(3).normal(0, 1, (200, 4))
+    hints[:100, 2] += 4
+    records = [Records(hints, np.repeat([0.3, 0.0], 100))]
+    belief = model((0, 1, 2, 3), 0.0)
+    assert fit(records, belief)[2] > 1
+    assert separation(records, belief, fit(records, belief)) > 0.98
+    assert np.isnan(separation(records, model((2,)), np.ones(2)))
 
 
 KNOWN = sorted(load_split(SPLIT).parts['train'])[0]

@@ -39,8 +39,8 @@ class PresenceConfig:
         Score below which TRACKING becomes UNCERTAIN, and from which UNCERTAIN becomes TRACKING
         again.
     lost : float
-        Score below which a frame is not believed; after a jump by more than the target's side,
-        `uncertain` is.
+        Probability that the target is there, even in a part, below which a frame is not
+        believed.
     lost_frames : int
         Frames in a row that are not believed until the state is LOST.
     found : float
@@ -56,11 +56,11 @@ class PresenceConfig:
 
     learn: str = 'tracking'
     reference_frames: int = 10
-    uncertain: float = 0.7
-    certain: float = 0.75
+    uncertain: float = 0.3
+    certain: float = 0.5
     lost: float = 0.3
     lost_frames: int = 5
-    found: float = 0.9
+    found: float = 0.7
     sharp: float = 0.4
     alike: float = 0.3
     distractors: bool = True

@@ -22,7 +22,8 @@ import numpy as np
 
 from lmsco_ros.core.config import IntensityConfig
 from lmsco_ros.core.errors import ImageError
-from lmsco_ros.core.imaging.sampled import credible_values, percentiles, take_probe
+from lmsco_ros.core.imaging.sampled import (
+    credible_values, noise_deviation, percentiles, take_probe)
 from lmsco_ros.core.imaging.scene_change import same_picture, scene_pattern, SceneMonitor
 
 __all__ = ['AutomaticGain', 'FrameCondition', 'FrameSurvey', 'IntensityRange', 'survey']
@@ -75,6 +76,8 @@ class FrameSurvey:
         What of the scene is compared with other frames; None when it shows nothing.
     upright, mirrored : IntensityRange
         Percentiles of its counts, counted from below and from above.
+    noise : float
+        Standard deviation of its noise in counts.
 
     """
 
@@ -83,6 +86,7 @@ class FrameSurvey:
     pattern: np.ndarray | None
     upright: IntensityRange
     mirrored: IntensityRange
+    noise: float = 0.0
 
 
 def survey(image: np.ndarray, config: IntensityConfig) -> FrameSurvey:
@@ -105,7 +109,7 @@ def survey(image: np.ndarray, config: IntensityConfig) -> FrameSurvey:
     probe = take_probe(image)
     upright, mirrored = _measure(image, probe, config)
     pattern = scene_pattern(probe, upright.low, upright.high)
-    return FrameSurvey(image, probe, pattern, upright, mirrored)
+    return FrameSurvey(image, probe, pattern, upright, mirrored, noise_deviation(image))
 
 
 @dataclass(frozen=True)
@@ -124,6 +128,8 @@ class FrameCondition:
         Whether the polarity (white hot, black hot) is not the one of the first frame.
     cut : bool
         Whether it shows another view than the frame before.
+    noise : float
+        Standard deviation of its noise in the working range.
 
     """
 
@@ -131,6 +137,7 @@ class FrameCondition:
     shutter_closed: bool
     inverted: bool
     cut: bool
+    noise: float = 0.0
 
 
 class AutomaticGain:
@@ -167,8 +174,9 @@ class AutomaticGain:
                                    at_once=change.switched or change.cut)
         closed = self._probe is not None and same_picture(self._probe, frame.probe)
         self._probe = frame.probe
+        noise = frame.noise / abs(self._range.high - self._range.low)
         return FrameCondition(self._range.turned() if inverted else self._range, closed, inverted,
-                              change.cut)
+                              change.cut, noise)
 
     def _follow(self, measured: IntensityRange, at_once: bool) -> IntensityRange:
         """Return the range after one more frame."""

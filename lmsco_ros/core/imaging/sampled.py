@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""A frame seen through a regular subset of its pixels: percentiles, credible values."""
+"""A frame seen through a regular subset of its pixels: percentiles, credible values, noise."""
 
 from __future__ import annotations
 
@@ -21,15 +21,20 @@ import numpy as np
 
 from lmsco_ros.core.imaging.pixels import filled, measured, to_gray
 
-__all__ = ['credible_values', 'percentiles', 'take_probe']
+__all__ = ['credible_values', 'noise_deviation', 'percentiles', 'take_probe']
 
 _PROBE_POINTS = 8192
+_NOISE_POINTS = 4096
 
 # Telemetry read as pixels: neighbors differ as much as any two pixels of the row do (a ratio
 # of 1.3 for noise), and the row spreads over more than the scene (in units of its spread).
 _NOISE_RATIO = 0.8
 
 _NOISE_SPREAD = 2.0
+
+# Of the second difference of white noise, over its own deviation; and the median of the amount
+# of a normal distribution, over its deviation.
+_SECOND_DIFFERENCE, _MEDIAN = 6**0.5, 0.6745
 
 
 def take_probe(image: np.ndarray) -> np.ndarray:
@@ -105,6 +110,27 @@ def credible_values(image: np.ndarray, probe: np.ndarray, spread: float) -> np.n
     deviation = np.abs(repaired - repaired.mean(axis=1, keepdims=True)).mean(axis=1)
     noise = (roughness > _NOISE_RATIO * deviation) & (deviation > _NOISE_SPREAD * spread)
     return probe[finite & ~alone & ~noise[:, None]]
+
+
+def noise_deviation(image: np.ndarray) -> float:
+    """
+    Return the standard deviation of the noise of a frame, in counts.
+
+    That of what a pixel differs by from the mean of its neighbors in the row, by its median: the
+    edges of a scene are few. A fine texture counts as noise, in which a target is as hard to see.
+
+    Parameters
+    ----------
+    image : ndarray, shape (H, W) or (H, W, 3)
+        A frame; pixels without a value do not count.
+
+    """
+    height, width = image.shape[:2]
+    step = min(height, max(1, height * width // _NOISE_POINTS))
+    rows = measured(to_gray(image[step // 2::step])).astype(np.float32, copy=False)
+    second = np.abs(rows[:, 2:] + rows[:, :-2] - 2 * rows[:, 1:-1])
+    known = second[np.isfinite(second)]
+    return float(np.median(known)) / (_MEDIAN * _SECOND_DIFFERENCE) if known.size else 0.0
 
 
 def _step(image: np.ndarray) -> int:

@@ -20,10 +20,13 @@ from dataclasses import dataclass
 
 from lmsco_ros.core.types import TrackState
 
-__all__ = ['Assessment', 'Evidence', 'JUMP', 'Verdict']
+__all__ = ['Assessment', 'Evidence', 'JUMP', 'NOTHING_STANDS_OUT', 'Verdict']
 
 JUMP = 1.0
 """Distance from the expected place, in sides of the target, from which a move is a jump."""
+
+NOTHING_STANDS_OUT = 'start: nothing stands out'
+"""Said of a target that does not differ from its surroundings where it was started."""
 
 
 @dataclass(frozen=True)
@@ -41,6 +44,9 @@ class Evidence:
     presence : float or None
         Log-odds, by the network that measures the extent, that the target of the first frame
         is there; None where nothing measures.
+    vagueness : float or None
+        Mean deviation of the edges that were measured, in sides of the target: large where
+        nothing stands out from its surroundings. None where nothing measures.
     jump : float
         Distance, in sides of the target, from where it was expected.
 
@@ -49,31 +55,35 @@ class Evidence:
     sharpness: float
     likeness: float = 1.0
     presence: float | None = None
+    vagueness: float | None = None
     jump: float = 0.0
 
 
 @dataclass(frozen=True)
 class Assessment:
     """
-    Evidence, measured against what was usual in the frames before.
+    Evidence, measured against what the scene lets expect.
 
     Attributes
     ----------
     evidence : Evidence
         What was measured.
     quality : float
-        Sharpness as a part of the reference.
-    presence : float or None
-        Log-odds of presence, as of a target that the network knows.
+        Sharpness as a part of what is expected.
+    likeness : float
+        Likeness as a part of what is expected.
     score : float
-        Probability that the detection is the target, in [0, 1].
+        Probability that a box there covers the target by more than half, in [0, 1].
+    belief : float
+        Probability that it is the target, even in a part, in [0, 1].
 
     """
 
     evidence: Evidence
     quality: float
-    presence: float | None
+    likeness: float
     score: float
+    belief: float
 
 
 @dataclass(frozen=True)
@@ -84,13 +94,17 @@ class Verdict:
     Attributes
     ----------
     score : float
-        Probability that the frame shows the target, in [0, 1].
+        Probability that the box covers the target by more than half, in [0, 1].
     state : TrackState
         State after the frame.
     believed : bool
         Whether the box moves to what was detected.
     learns : bool
         Whether the filter learns from it.
+    promising : bool
+        Whether it would be believed if the next frame agreed.
+    note : str
+        What else a person should know; mostly nothing.
 
     """
 
@@ -98,3 +112,5 @@ class Verdict:
     state: TrackState
     believed: bool
     learns: bool
+    promising: bool = False
+    note: str = ''

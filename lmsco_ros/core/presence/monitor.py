@@ -16,31 +16,36 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-import math
-
-import numpy as np
-
 from lmsco_ros.core.config import PresenceConfig
-from lmsco_ros.core.presence.evidence import Assessment, Evidence, JUMP, Verdict
-from lmsco_ros.core.presence.trust import trust
+from lmsco_ros.core.presence.evidence import (
+    Assessment, Evidence, JUMP, NOTHING_STANDS_OUT, Verdict)
+from lmsco_ros.core.presence.expectation import Expectation
+from lmsco_ros.core.presence.trust import belief, trust
 from lmsco_ros.core.types import TrackState
 
 __all__ = ['PresenceMonitor']
 
-# Log-odds that the network gives a target like those of its training, and the part of the way
-# that the measure of another target follows in one frame.
-_USUAL_PRESENCE = 4.0
-_USUAL_RATE = 0.1
-
 # After a cut the target is likely to be somewhere in the picture, and looks different: score and
 # part of the other thresholds that it has to reach, and its least log-odds of presence. By then,
 # in frames, it would have been found.
-_AFTER_CUT = (0.8, 0.5, -2.0)
+_AFTER_CUT = (0.5, 0.5, -2.0)
 _CUT_FRAMES = 100
 
+# Jump, in sides of the target, that leads out of the region in which it was looked for; and how
+# far from the first of two frames that agree the second may see it.
+_ELSEWHERE, _AGREEING = 2.5, 2.0
+# Frames after a target was found again in which a single doubt is enough to give it up.
+_PROBATION = 5
 
-@dataclass
+# Belief that is enough for a jump, and to find again what has hardly moved.
+_LIKELY = 0.5
+# Score of a frame that shows nothing, where nothing stood out at the start.
+_NOTHING = 0.2
+
+# Part of the sharpness that convinces, of a target that is not in the middle of its region.
+_HINT = 0.5
+
+
 class PresenceMonitor:
     """
     Judges each frame by its evidence, against the first frames of the track.
@@ -55,13 +60,15 @@ class PresenceMonitor:
 
     """
 
-    config: PresenceConfig
-    _first: list[float] = field(default_factory=list)
-    _usual: float = _USUAL_PRESENCE
-    _reference: float | None = None
-    _state: TrackState = TrackState.TRACKING
-    _misses: int = 0
-    _cut: int = 0
+    def __init__(self, config: PresenceConfig) -> None:
+        self.config = config
+        self._expectation = Expectation(config.reference_frames)
+        self._state = TrackState.TRACKING
+        self._misses = 0
+        self._cut = 0
+        self._promised = False
+        self._probation = 0
+        self._doubtful = False
 
     @property
     def state(self) -> TrackState:
@@ -73,11 +80,41 @@ class PresenceMonitor:
         """Whether the view has changed a while ago and the target has not been seen since."""
         return self._cut > 0
 
+    @property
+    def hurried(self) -> bool:
+        """Whether the target was seen, or the view has changed, so shortly ago that it hurries."""
+        recent = self.config.lost_frames
+        return self._misses < recent or self._cut > _CUT_FRAMES - recent
+
+    def start(self, evidence: Evidence) -> Verdict:
+        """
+        Decide on the first frame.
+
+        What does not stand out from its surroundings there is followed, but not learned from
+        until it does.
+        """
+        seen = self.assess(evidence)
+        stands_out = seen.score >= self.config.certain
+        self._state = TrackState.TRACKING if stands_out else TrackState.UNCERTAIN
+        self._doubtful = not stands_out
+        return Verdict(seen.score, self._state, believed=True, learns=stands_out, note=self._note())
+
+    def note_noise(self, noise: float) -> None:
+        """Take note of the noise of the next frame, its deviation in the working range."""
+        self._expectation.note_noise(noise)
+
+    def note_cut(self) -> None:
+        """Take note that the view has changed: the target has to be found again."""
+        self._cut = _CUT_FRAMES
+
     def assess(self, evidence: Evidence) -> Assessment:
-        """Return the evidence, measured against the frames before."""
-        quality, presence = self._quality(evidence.sharpness), self._presence(evidence.presence)
-        score = trust(quality, evidence.likeness, presence) if quality else 0.0
-        return Assessment(evidence, quality, presence, score)
+        """Return the evidence, measured against what the scene lets expect."""
+        quality = self._expectation.quality(evidence.sharpness)
+        likeness = self._expectation.likeness(evidence.likeness)
+        if not quality:
+            return Assessment(evidence, 0.0, likeness, 0.0, 0.0)
+        hints = quality, likeness, evidence.presence, evidence.vagueness
+        return Assessment(evidence, quality, likeness, trust(*hints), belief(*hints))
 
     def believable(self, seen: Assessment) -> bool:
         """Return whether a frame shows the target."""
@@ -89,67 +126,78 @@ class PresenceMonitor:
 
         Filter, first filter and extent network must agree, each of them; less so after a cut.
         """
-        found, part, present = _AFTER_CUT if self.after_cut else (1.0, 1.0, 0.0)
+        found, part = _AFTER_CUT[:2] if self.after_cut else (1.0, 1.0)
         return (seen.score >= min(self.config.found, found)
                 and seen.quality >= part * self.config.sharp
-                and seen.evidence.likeness >= part * self.config.alike
-                and (seen.presence is None or seen.presence >= present))
+                and seen.likeness >= part * self.config.alike
+                and (seen.evidence.presence is None or self.present(seen.evidence.presence)))
+
+    def present(self, presence: float) -> bool:
+        """Return whether such log-odds of presence may convince."""
+        return presence >= (_AFTER_CUT[2] if self.after_cut else 0.0)
+
+    def hints(self, sharpness: float) -> bool:
+        """Return whether a score is so sharp that it may convince from nearer by."""
+        return self._expectation.quality(sharpness) >= _HINT * self.config.sharp
 
     def resembles(self, evidence: Evidence) -> bool:
         """Return whether something looks like the target, which itself may stand beside it."""
-        score = trust(1.0, evidence.likeness, self._presence(evidence.presence))
-        return score >= self.config.uncertain and evidence.likeness >= self.config.alike
-
-    def note_cut(self) -> None:
-        """Take note that the view has changed: the target has to be found again."""
-        self._cut = _CUT_FRAMES
+        likeness = self._expectation.likeness(evidence.likeness)
+        score = trust(1.0, likeness, evidence.presence, evidence.vagueness)
+        return score >= self.config.uncertain and likeness >= self.config.alike
 
     def judge(self, seen: Assessment) -> Verdict:
-        """Decide on a frame: what is told of it, and whether the track follows and learns."""
-        believed, missed = self.believable(seen), self._misses_target(seen)
-        self._misses = self._misses + 1 if missed else 0
-        self._cut = max(0, self._cut - 1) if missed else 0
-        if not missed:
+        """
+        Decide on a frame: what is told of it, and whether the track follows and learns.
+
+        Where the target has to be found again, two frames that agree are believed; and the first
+        doubt thereafter gives it up. After a cut it is lost until then: its place is of a view
+        that is no more.
+        """
+        found = not self._misses_target(seen)
+        agreed, promising = found and self._promised, False
+        if found and not agreed and self._needs_another(seen):
+            found, promising = False, True
+        given_up = not found and self._probation > 0
+        self._misses = 0 if found else self._misses + 1
+        self._cut = 0 if found else max(0, self._cut - 1)
+        self._probation = _PROBATION if agreed else max(0, self._probation - 1) if found else 0
+        self._promised = promising
+        if found:
+            self._expectation.learn(seen.evidence.sharpness)
             self._state = (TrackState.TRACKING if seen.score >= self._certain()
                            else TrackState.UNCERTAIN)
-            self._set_reference(seen.evidence)
+            self._doubtful &= self._state is not TrackState.TRACKING
         elif self._state is not TrackState.LOST:
-            lost = self._misses >= self.config.lost_frames
+            lost = given_up or self.after_cut or self._misses >= self.config.lost_frames
             self._state = TrackState.LOST if lost else TrackState.UNCERTAIN
-        learns = self._state is TrackState.TRACKING or self.config.learn == 'always'
-        return Verdict(seen.score, self._state, believed, learns)
-
-    def _quality(self, sharpness: float) -> float:
-        """Return the sharpness as a part of the reference; 1 as long as there is none."""
-        if not math.isfinite(sharpness) or sharpness <= 0:
-            return 0.0
-        return sharpness / self._reference if self._reference else 1.0
-
-    def _presence(self, measured: float | None) -> float | None:
-        """
-        Return the log-odds of presence, as of a target that the network knows.
-
-        A target unlike those of the training, or one that slowly turns, has low odds while it is
-        followed with certainty; only what falls below that speaks against it.
-        """
-        return None if measured is None else measured + max(0.0, _USUAL_PRESENCE - self._usual)
+        always = self.config.learn == 'always'
+        return Verdict(seen.score, self._state, believed=found or always, promising=promising,
+                       learns=self._state is TrackState.TRACKING or always, note=self._note())
 
     def _misses_target(self, seen: Assessment) -> bool:
         """Return whether a frame does not show the target, as far as one can tell."""
-        if self.after_cut or self._state is TrackState.LOST:
-            return not self.convincing(seen)
-        jumped = seen.evidence.jump > JUMP
-        return seen.score < (self.config.uncertain if jumped else self.config.lost)
+        near = seen.evidence.jump <= (_AGREEING if self._promised else JUMP)
+        if self._promised and not near:
+            return True
+        if self._promised or self.after_cut or self._needs_another(seen):
+            return not (near and seen.belief >= _LIKELY) and not self.convincing(seen)
+        if seen.evidence.jump > JUMP or self._probation > 0:
+            return seen.belief < _LIKELY
+        return seen.belief < self.config.lost or self._doubtful and seen.score < _NOTHING
 
-    def _set_reference(self, evidence: Evidence) -> None:
-        """Take a frame that shows the target into what later frames are measured against."""
-        if evidence.sharpness > 0 and len(self._first) < self.config.reference_frames:
-            self._first.append(evidence.sharpness)
-            self._reference = float(np.median(self._first))
-        if evidence.presence is not None and self._state is TrackState.TRACKING:
-            self._usual += _USUAL_RATE * (evidence.presence - self._usual)
+    def _needs_another(self, seen: Assessment) -> bool:
+        """Return whether another frame has to agree: not with what stayed through a cut."""
+        farthest = JUMP if self.after_cut else _ELSEWHERE
+        return self._state is TrackState.LOST or seen.evidence.jump > farthest
+
+    def _note(self) -> str:
+        """Return what is told of a start that nothing has stood out from since."""
+        return NOTHING_STANDS_OUT if self._doubtful else ''
 
     def _certain(self) -> float:
         """Return the score from which the state is TRACKING: less for one that already is."""
+        if self._probation:
+            return float('inf')
         tracking = self._state is TrackState.TRACKING
         return self.config.uncertain if tracking else self.config.certain

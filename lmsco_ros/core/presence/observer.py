@@ -20,7 +20,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 import math
 
+from lmsco_ros.core.config import ScaleConfig
 from lmsco_ros.core.detection.detector import Detection, Detector
+from lmsco_ros.core.detection.scale import found_factor
 from lmsco_ros.core.extent.measurement import ExtentMeter, Measurement
 from lmsco_ros.core.imaging.view import FrameView
 from lmsco_ros.core.networks.together import Asking, at_once
@@ -46,6 +48,8 @@ class Outlook:
         The target where it was seen last.
     expected : BoundingBox
         Where it is expected in this frame.
+    predicted : BoundingBox
+        Where its motion has led it meanwhile.
     neighbors : Neighbors or None
         Other targets; None where there are none.
 
@@ -54,6 +58,7 @@ class Outlook:
     view: FrameView
     last: BoundingBox
     expected: BoundingBox
+    predicted: BoundingBox
     neighbors: Neighbors | None = None
 
     def is_neighbor(self, detection: Detection) -> bool:
@@ -85,6 +90,15 @@ class Sighting:
     assessment: Assessment
     measurement: Measurement | None
 
+    @property
+    def found(self) -> BoundingBox:
+        """The box at what was detected, in the size that was looked for."""
+        return self.box.moved_to(self.detection.center)
+
+    def sized(self, scale: ScaleConfig) -> BoundingBox:
+        """Return that box in the size that was found, where several were searched."""
+        return self.found.scaled(found_factor(scale, self.detection.peak.scale_values))
+
 
 class Observer:
     """
@@ -110,6 +124,12 @@ class Observer:
         self._monitor = monitor
         self._distractors = Distractors()
         self._first_likeness = detector.likeness(first)
+        self._first_sharpness = first.sharpness
+
+    def introduce(self, view: FrameView, box: BoundingBox) -> Evidence:
+        """Return what speaks for the target in its box of the first frame."""
+        measured = None if self._meter is None else self._meter(view, box)
+        return Evidence(self._first_sharpness, 1.0, *_told(measured, box))
 
     def look(self, outlook: Outlook, factors: Sequence[float]) -> Asking[Sighting]:
         """
@@ -142,6 +162,10 @@ class Observer:
         """Return a detection around a box, measured, with all that speaks for it."""
         return at_once(self._ask(outlook, detection, box))
 
+    def measure(self, outlook: Outlook, box: BoundingBox) -> float | None:
+        """Return the log-odds that the target is in a box; None where nothing measures."""
+        return None if self._meter is None else self._meter(outlook.view, box).presence
+
     def _ask(self, outlook: Outlook, detection: Detection,
              box: BoundingBox) -> Asking[Sighting]:
         """Return a detection as `weigh` does, and ask for what is measured."""
@@ -149,8 +173,7 @@ class Observer:
             outlook.view, box.moved_to(detection.center)))
         likeness = self._detector.likeness(detection) / self._first_likeness
         jump = math.dist(detection.center, outlook.expected.center) / outlook.expected.area**0.5
-        presence = None if measured is None else measured.presence
-        evidence = Evidence(detection.sharpness, likeness, presence, jump)
+        evidence = Evidence(detection.sharpness, likeness, *_told(measured, box), jump)
         return Sighting(box, detection, self._monitor.assess(evidence), measured)
 
     def is_distractor(self, outlook: Outlook, detection: Detection) -> bool:
@@ -173,6 +196,14 @@ class Observer:
 
     def _resembles(self, view: FrameView, box: BoundingBox) -> bool:
         """Return whether a frame shows something like the target in a box."""
-        outlook = Outlook(view, box, box)
+        outlook = Outlook(view, box, box, box)
         seen = self._detector.near(self.detect(outlook, box), box.center)
         return self._monitor.resembles(self.weigh(outlook, seen, box).assessment.evidence)
+
+
+def _told(measured: Measurement | None,
+          box: BoundingBox) -> tuple[float, float] | tuple[None, None]:
+    """Return presence and vagueness of what was measured at a box; None where nothing was."""
+    if measured is None:
+        return None, None
+    return measured.presence, float(measured.deviations.mean()) / box.area**0.5

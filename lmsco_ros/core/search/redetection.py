@@ -16,18 +16,23 @@
 
 from __future__ import annotations
 
+import math
+
 from lmsco_ros.core.config import SearchConfig
+from lmsco_ros.core.detection.detector import Detection
 from lmsco_ros.core.imaging.view import FrameView
 from lmsco_ros.core.presence.monitor import PresenceMonitor
 from lmsco_ros.core.presence.observer import Observer, Outlook, Sighting
 from lmsco_ros.core.search.salience import Salience
-from lmsco_ros.core.search.schedule import Schedule
-from lmsco_ros.core.types import BoundingBox, TrackState
+from lmsco_ros.core.search.schedule import Schedule, Turn
+from lmsco_ros.core.types import BoundingBox
 
 __all__ = ['Redetection']
 
 # Sizes of the target that are considered after a cut.
 _CUT_SCALES = (1.0, 0.7, 1.4)
+# Salient places among which those around a place are found; around means so many sides away.
+_MANY, _NEAR = 48, 6.0
 
 
 class Redetection:
@@ -78,10 +83,10 @@ class Redetection:
 
         """
         self._observer.follow_distractors(outlook)
-        hurried = after_shutter or self._monitor.state is not TrackState.LOST
-        turn = self._schedule.turn(misses, hurried=hurried, after_shutter=after_shutter)
-        seen = self._salient(outlook, turn.salient)
-        seen += self._tiles(outlook, here.detection.region.width, turn.slices)
+        if after_shutter or self._monitor.hurried:
+            seen = self._hurried(outlook, here, misses, 2 if after_shutter else 1)
+        else:
+            seen = self._sparing(outlook, here, misses)
         seen.sort(key=lambda sighting: -sighting.assessment.score)
         return next((other for other in seen if self._prefers(outlook, other, here)), here)
 
@@ -91,27 +96,56 @@ class Redetection:
                 and self._monitor.convincing(other.assessment)
                 and not self._observer.is_distractor(outlook, other.detection))
 
-    def _salient(self, outlook: Outlook, chosen: range) -> list[Sighting]:
-        """Return what is at the salient places whose turn it is."""
-        if not chosen:
-            return []
-        scales = _CUT_SCALES if self._monitor.after_cut else (1.0,)
-        found = self._salience.candidates(
-            outlook.view, outlook.expected, self._schedule.candidates, scales)
-        return [self._look_at(outlook, box) for box in found[chosen.start:chosen.stop]]
+    def _hurried(self, outlook: Outlook, here: Sighting, misses: int,
+                 slices: int) -> list[Sighting]:
+        """Return what is at salient places and in slices, at the price of several frames."""
+        chosen = self._schedule.salient(misses)
+        places = self._salient(outlook, self._schedule.candidates) if chosen else []
+        seen = [self._look_at(outlook, box) for box in places[chosen.start:chosen.stop]]
+        sharpest = self._tiles(outlook, here, slices)
+        return seen + ([] if sharpest is None else [self._look_again(outlook, sharpest)])
 
-    def _tiles(self, outlook: Outlook, side: float, slices: int) -> list[Sighting]:
+    def _sparing(self, outlook: Outlook, here: Sighting, misses: int) -> list[Sighting]:
+        """Return what is where the turn is, if anything is: it costs little more than a frame."""
+        turn = self._schedule.turn(misses)
+        if turn is Turn.TILES:
+            sharpest = self._tiles(outlook, here, 1)
+            again = sharpest is not None and self._monitor.hints(sharpest.sharpness)
+            return [self._look_again(outlook, sharpest)] if again else []
+        chosen = self._schedule.measured(misses)
+        places = self._salient(outlook, _MANY) if chosen else []
+        if turn is Turn.ANYWHERE:
+            places = places[chosen.start:chosen.stop]
+        else:
+            center = (outlook.last if turn is Turn.NEAR else outlook.predicted).center
+            reach = _NEAR * outlook.expected.area**0.5
+            places = [box for box in places if math.dist(box.center, center) < reach]
+        best = self._most_present(outlook, places[:len(chosen)])
+        return [] if best is None else [self._look_at(outlook, best)]
+
+    def _most_present(self, outlook: Outlook, places: list[BoundingBox]) -> BoundingBox | None:
+        """Return the place that the network takes for the target, or the first without one."""
+        measured = [(self._observer.measure(outlook, box), box) for box in places]
+        known = [(presence, box) for presence, box in measured
+                 if presence is None or self._monitor.present(presence)]
+        return max(known, key=lambda one: one[0] or 0.0, default=(None, None))[1]
+
+    def _salient(self, outlook: Outlook, count: int) -> list[BoundingBox]:
+        """Return so many salient places at most."""
+        scales = _CUT_SCALES if self._monitor.after_cut else (1.0,)
+        return self._salience.candidates(outlook.view, outlook.expected, count, scales)
+
+    def _tiles(self, outlook: Outlook, here: Sighting, slices: int) -> Detection | None:
         """Return the sharpest detection in the regions whose turn it is."""
-        if not slices:
-            return []
-        places = self._schedule.tiles(outlook.view.size, side, outlook.expected.center, slices)
+        places = self._schedule.tiles(outlook.view.size, here.detection.region.width,
+                                      outlook.expected.center, slices)
         found = [self._observer.detect(outlook, outlook.expected.moved_to(place))
                  for place in places]
-        if not found:
-            return []
-        sharpest = max(found, key=lambda detection: detection.sharpness)
-        # The window of a tile dims what lies off its center: look again from there.
-        return [self._look_at(outlook, outlook.expected.moved_to(sharpest.center))]
+        return max(found, key=lambda detection: detection.sharpness, default=None)
+
+    def _look_again(self, outlook: Outlook, found: Detection) -> Sighting:
+        """Return what is at a detection: the window of its tile dims what lies off the center."""
+        return self._look_at(outlook, outlook.expected.moved_to(found.center))
 
     def _look_at(self, outlook: Outlook, box: BoundingBox) -> Sighting:
         """Return what is around a box."""

@@ -16,7 +16,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from enum import Enum
 
 from lmsco_ros.core.config import SearchConfig
 from lmsco_ros.core.imaging.regions import search_tiles
@@ -25,26 +25,20 @@ __all__ = ['Schedule', 'Turn']
 
 _Point = tuple[float, float]
 
-# Searches in which all salient places get their turn; odd, since later every other frame has one.
+# Searches in which all salient places get their turn.
 _TURNS = 3
 
 
-@dataclass(frozen=True)
-class Turn:
-    """
-    What is searched in a frame.
+class Turn(Enum):
+    """Where a target that has been lost for a while is looked for in a frame."""
 
-    Attributes
-    ----------
-    salient : range
-        Which of the salient places, in the order of their salience.
-    slices : int
-        How many slices of the image.
+    NEAR = 'at what is salient around the last place'
+    AHEAD = 'at what is salient around the place to which its motion has led'
+    ANYWHERE = 'at what is salient in the whole image'
+    TILES = 'in a slice of the image'
 
-    """
 
-    salient: range
-    slices: int
+_SALIENT_TURNS = (Turn.NEAR, Turn.AHEAD, Turn.ANYWHERE)
 
 
 class Schedule:
@@ -75,27 +69,23 @@ class Schedule:
         """Begin the search anew, from where the target is expected then."""
         self._order = []
 
-    def turn(self, misses: int, *, hurried: bool, after_shutter: bool) -> Turn:
-        """
-        Return what is searched in a frame.
-
-        Parameters
-        ----------
-        misses : int
-            Frames since the target was seen.
-        hurried : bool
-            Whether both are searched; in the long run they take turns, so that a frame without
-            the target costs less.
-        after_shutter : bool
-            Whether the target may have got further than in one frame, behind a closed shutter.
-
-        """
+    def salient(self, misses: int) -> range:
+        """Return which of the salient places are looked at so many frames after a sight."""
         first = misses % _TURNS * self._config.candidates
-        salient = range(first, first + self._config.candidates)
-        slices = 2 if after_shutter else 1
-        if hurried:
-            return Turn(salient, slices)
-        return Turn(range(0), slices) if misses % 2 else Turn(salient, 0)
+        return range(first, first + self._config.candidates)
+
+    def turn(self, misses: int) -> Turn:
+        """Return where a lost target is looked for, so many frames after it was seen."""
+        if misses % 2:
+            return Turn.TILES
+        return _SALIENT_TURNS[misses // 2 % len(_SALIENT_TURNS)]
+
+    def measured(self, misses: int) -> range:
+        """Return which of the salient places are measured when these have their turn."""
+        count = -(-self._config.candidates // 2)
+        turns = -(-self.candidates // count) if count else 1
+        first = misses // (2 * len(_SALIENT_TURNS)) % turns * count
+        return range(first, first + count)
 
     def tiles(self, image_size: tuple[int, int], side: float, around: _Point,
               slices: int) -> list[_Point]:

@@ -230,7 +230,7 @@ BOUNDS = [
     (ScaleConfig, 'step', 1, 2.1), (ScaleConfig, 'exponent_min', -51, 1),
     (ScaleConfig, 'exponent_max', -1, 51),
     (MotionConfig, 'least_motion', -0.1, 101),
-    (PresenceConfig, 'found', 0.05, 1.1), (PresenceConfig, 'certain', 0.4, 1.1),
+    (PresenceConfig, 'found', 0.05, 1.1), (PresenceConfig, 'certain', 0.2, 1.1),
     (PresenceConfig, 'sharp', -0.1, 2.1), (PresenceConfig, 'alike', -1.1, 2.1),
     (PresenceConfig, 'reference_frames', 0, 1001), (PresenceConfig, 'lost_frames', 0, 1001),
     (SearchConfig, 'candidates', -1, 65), (SearchConfig, 'tiles', -1, 65),

@@ -144,17 +144,18 @@ def flow(config, scene):
 def scored(score, quality=1.0, likeness=0.5):
     """Return the hints of a score, whichever coefficients were fitted; usual are 20 and 4."""
     odds = math.log(score / (1 - score)) - (
-        MEASURED.constant + MEASURED.quality * math.log(quality) + MEASURED.likeness * likeness)
-    return 20 * quality, likeness, odds / MEASURED.presence, 0
+        MEASURED.constant + MEASURED.quality * math.log(quality) + MEASURED.likeness * likeness
+        + MEASURED.presence)
+    return 20 * quality, likeness, 1, math.exp(odds / MEASURED.vagueness), 0
 
 
 # Clear frames, sharper and sharper ones; fading, half back, and gone; then, for a moment each,
 # what is not sharp, not alike, or not quite enough; at last the target.
 STORY = [Evidence(*hints) for hints in (
-    *3 * [(10, 1, 4, 0)], *6 * [(20, 1, 4, 0)], *3 * [(10, 1, 4, 0)],
-    scored(.6), scored(.45), scored(.85), (10, 1, 4, 0),
-    *4 * [(1, 0, -5, 0)], (3, .3, -2, 0), *3 * [(1, 0, -5, 0)],
-    (4, 1.2, 8, 2), (20, .28, 6, 2), scored(.85, .45, .35), (14, 1, 4, 2))]
+    *3 * [(10, 1, 4, .06, 0)], *6 * [(20, 1, 4, .06, 0)], *3 * [(10, 1, 4, .06, 0)],
+    scored(.45), scored(.3), scored(.55), scored(.2), (10, 1, 4, .06, 0),
+    *4 * [(1, 0, -5, .2, 0)], (3, .3, -2, .15, 0), (2, .3, -2, .12, 0), *3 * [(1, 0, -5, .2, 0)],
+    (5, 1.2, 8, .05, 2), (20, .28, 6, .05, 2), scored(.6, .45, .35), (14, 1, 4, .06, 2))]
 
 
 def verdicts(config, scene):
@@ -172,9 +173,8 @@ def searched(config, scene):
     """Return how much is searched in the frames after a target was seen."""
     schedule, told = Schedule(config.search), []
     for misses in range(4):
-        turn = schedule.turn(misses, hurried=True, after_shutter=False)
-        told += [turn.salient.start, turn.salient.stop,
-                 len(schedule.tiles((640, 512), 80, START, turn.slices))]
+        salient = schedule.salient(misses)
+        told += [salient.start, salient.stop, len(schedule.tiles((640, 512), 80, START, 1))]
     return told
 
 
@@ -234,8 +234,8 @@ EFFECTS = (
     Effect('presence.learn', 'always', verdicts),
     Effect('presence.reference_frames', 3, verdicts),
     Effect('presence.uncertain', 0.5, verdicts),
-    Effect('presence.certain', 0.95, verdicts),
-    Effect('presence.lost', 0.6, verdicts),
+    Effect('presence.certain', 0.99, verdicts),
+    Effect('presence.lost', 0.1, verdicts),
     Effect('presence.lost_frames', 2, verdicts),
     Effect('presence.found', 0.5, verdicts),
     Effect('presence.sharp', 0.2, verdicts),

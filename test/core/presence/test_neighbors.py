@@ -88,7 +88,7 @@ def seen(center):
 OWN = Neighbors((112.0, 84.0), ((130.0, 84.0), (160.0, 80.0)))
 LAST = BoundingBox.from_center((110, 84), (20, 20))
 VIEW = FrameView(np.zeros((240, 320), np.uint8), IntensityRange(0, 1))
-OUTLOOK = Outlook(VIEW, LAST, LAST, OWN)
+OUTLOOK = Outlook(VIEW, LAST, LAST, LAST, OWN)
 
 
 def observing(detector):

@@ -77,6 +77,9 @@ class Meter:
         self.calls.append((view, box))
         return (yield Ask('meter', lambda turns: [self.measured() for _ in turns], box))
 
+    def __call__(self, view, box):
+        return at_once(self.ask(view, box))
+
     def measured(self):
         edges = np.array([[100, 118], [70, 92]])
         self.measurements.append(Measurement(edges, np.ones((2, 2)), self.presence))
@@ -105,7 +108,7 @@ def view():
 
 @pytest.fixture
 def outlook():
-    return Outlook(view(), LAST, EXPECTED)
+    return Outlook(view(), LAST, EXPECTED, LAST)
 
 
 def look(observer, outlook, factors=(1.0,)):
@@ -126,8 +129,9 @@ def test_evidence_is_measured_against_first_frame_and_expected_place(
     detector.next = [seen((122.0, 89.0), sharpness=7.0, likeness=0.25)]
     sighting = look(observer, outlook)
     evidence = sighting.assessment.evidence
-    # The filter of the first frame says half of what it did there; the jump is 13 pixels.
-    assert evidence == Evidence(7.0, 0.5, 3.0, pytest.approx(13 / 20))
+    # The filter of the first frame says half of what it did there; edges are off by a pixel
+    # of the 20 of a side; the jump is 13 pixels.
+    assert evidence == Evidence(7.0, 0.5, 3.0, 1 / 20, pytest.approx(13 / 20))
     assert sighting.assessment == monitor.assess(evidence)
 
 
@@ -140,7 +144,32 @@ def test_found_place_is_measured_in_the_looked_for_size(observer, detector, mete
 
 def test_nothing_is_measured_without_a_network(detector, monitor, outlook):
     sighting = look(Observer(detector, None, monitor, FIRST), outlook)
-    assert sighting.assessment.evidence.presence is None and sighting.measurement is None
+    evidence = sighting.assessment.evidence
+    assert evidence.presence is None and evidence.vagueness is None
+    assert sighting.measurement is None
+
+
+def test_first_frame_is_measured_as_all_others(observer, meter):
+    first, box = view(), BoundingBox(10, 20, 40, 10)
+    assert observer.introduce(first, box) == Evidence(FIRST.sharpness, 1.0, 3.0, 1 / 20)
+    assert meter.calls == [(first, box)]
+
+
+def test_first_frame_tells_what_there_is_without_a_network(detector, monitor):
+    observer = Observer(detector, None, monitor, FIRST)
+    assert observer.introduce(view(), LAST) == Evidence(FIRST.sharpness)
+    assert observer.measure(Outlook(view(), LAST, EXPECTED, LAST), LAST) is None
+
+
+def test_place_can_be_measured_without_the_filter(observer, detector, meter, outlook):
+    meter.presence = 0.5
+    assert observer.measure(outlook, LAST) == 0.5
+    assert meter.calls == [(outlook.view, LAST)] and detector.calls == []
+
+
+def test_sighting_is_found_where_it_was_detected(observer, detector, outlook):
+    detector.next = [seen((122.0, 89.0))]
+    assert look(observer, outlook).found == EXPECTED.moved_to((122.0, 89.0))
 
 
 def test_odds_of_zero_are_odds(observer, meter, outlook):

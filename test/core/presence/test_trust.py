@@ -26,57 +26,64 @@ from lmsco_ros.core.types import TrackState
 
 
 @given(quality=st.floats(0.01, 6), likeness=st.floats(-1, 2), more=st.floats(0, 2),
-       presence=st.one_of(st.none(), st.floats(-20, 20)))
-def test_trust_is_a_probability_that_grows_with_each_hint(quality, likeness, more, presence):
-    one = trust(quality, likeness, presence)
+       measured=st.one_of(st.none(), st.tuples(st.floats(-20, 20), st.floats(0.01, 1))))
+def test_trust_is_a_probability_that_grows_with_each_hint(quality, likeness, more, measured):
+    presence, vagueness = measured or (None, None)
+    one = trust(quality, likeness, presence, vagueness)
     assert 0 < one < 1
-    assert trust(quality + more, likeness, presence) >= one
-    assert trust(quality, likeness + more, presence) >= one
-    if presence is not None:
-        assert trust(quality, likeness, presence + more) >= one
+    assert trust(quality + more, likeness, presence, vagueness) >= one
+    assert trust(quality, likeness + more, presence, vagueness) >= one
+    if measured is not None:
+        assert trust(quality, likeness, presence + more, vagueness) >= one
+        assert trust(quality, likeness, presence, vagueness + more) <= one
 
 
-def logistic(model, quality, likeness, presence=0.0):
+def logistic(model, quality, likeness, presence=0.0, vagueness=1.0):
     """Return the probability that a model gives hints within their limits."""
     odds = (model.quality * np.log(quality) + model.likeness * likeness
-            + model.presence * presence + model.constant)
+            + model.presence * presence + model.vagueness * np.log(vagueness) + model.constant)
     return 1 / (1 + np.exp(-odds))
 
 
 def test_trust_is_the_logistic_function_of_the_weighted_hints():
-    assert trust(0.5, 0.8, 1.5) == pytest.approx(logistic(MEASURED, 0.5, 0.8, 1.5))
-    assert trust(0.5, 0.8, None) == pytest.approx(logistic(UNMEASURED, 0.5, 0.8))
+    assert trust(0.5, 0.8, 1.5, 0.1) == pytest.approx(logistic(MEASURED, 0.5, 0.8, 1.5, 0.1))
+    assert trust(0.5, 0.8) == pytest.approx(logistic(UNMEASURED, 0.5, 0.8))
 
 
 def test_every_hint_counts_that_there_is():
     """However the coefficients were fitted."""
     assert min(MEASURED.quality, MEASURED.likeness, MEASURED.presence) > 0.1
-    assert min(UNMEASURED.quality, UNMEASURED.likeness) > 0.1 and UNMEASURED.presence == 0
+    assert MEASURED.vagueness < -0.5
+    assert min(UNMEASURED.quality, UNMEASURED.likeness) > 0.1
+    assert UNMEASURED.presence == UNMEASURED.vagueness == 0
 
 
-@pytest.mark.parametrize(('there', 'gone'), [(4.0, -5.0), (None, None)],
+@pytest.mark.parametrize(('there', 'gone'), [((4.0, 0.06), (-5.0, 0.2)), ((), ())],
                          ids=['measured', 'unmeasured'])
 def test_target_as_in_the_first_frame_is_trusted_and_nothing_of_it_is_not(there, gone):
     limits = PresenceConfig()
-    assert trust(1.0, 1.0, there) > limits.found
-    assert trust(0.1, 0.0, gone) < limits.lost
+    assert trust(1.0, 1.0, *there) > limits.found
+    assert trust(0.1, 0.0, *gone) < limits.lost
 
 
 def test_values_that_are_no_numbers_speak_against_the_target():
-    assert trust(1.0, float('nan'), float('nan')) == trust(1.0, -0.5, -8.0)
+    nan = float('nan')
+    assert trust(1.0, nan, nan, nan) == trust(1.0, -0.5, -8.0, 0.5)
 
 
 @pytest.mark.parametrize('hints, limits', [
-    ((0.001, 0.5, 0.0), (0.02, 0.5, 0.0)), ((9.0, 0.5, 0.0), (5.0, 0.5, 0.0)),
-    ((1.0, -2.0, 0.0), (1.0, -0.5, 0.0)), ((1.0, 3.0, 0.0), (1.0, 1.5, 0.0)),
-    ((1.0, 0.5, -20.0), (1.0, 0.5, -8.0)), ((1.0, 0.5, 20.0), (1.0, 0.5, 8.0)),
-    ((float('inf'), 0.5, 0.0), (0.02, 0.5, 0.0))])
+    ((0.001, 0.5, 0.0, 0.1), (0.02, 0.5, 0.0, 0.1)), ((9.0, 0.5, 0.0, 0.1), (5.0, 0.5, 0.0, 0.1)),
+    ((1.0, -2.0, 0.0, 0.1), (1.0, -0.5, 0.0, 0.1)), ((1.0, 3.0, 0.0, 0.1), (1.0, 1.5, 0.0, 0.1)),
+    ((1.0, 0.5, -20.0, 0.1), (1.0, 0.5, -8.0, 0.1)),
+    ((1.0, 0.5, 20.0, 0.1), (1.0, 0.5, 8.0, 0.1)),
+    ((1.0, 0.5, 0.0, 0.01), (1.0, 0.5, 0.0, 0.03)), ((1.0, 0.5, 0.0, 2.0), (1.0, 0.5, 0.0, 0.5)),
+    ((float('inf'), 0.5, 0.0, 0.1), (0.02, 0.5, 0.0, 0.1))])
 def test_hints_count_up_to_their_limits(hints, limits):
     assert trust(*hints) == pytest.approx(logistic(MEASURED, *limits), rel=1e-9)
 
 
 def test_what_is_not_measured_is_not_what_is_measured_without_a_result():
-    assert trust(0.5, 0.5, None) != trust(0.5, 0.5, 0.0)
+    assert trust(0.5, 0.5) != trust(0.5, 0.5, 0.0, 0.5)
 
 
 @pytest.fixture
@@ -92,23 +99,34 @@ def state_after(monitor, evidence, frames=1):
     return state
 
 
-@pytest.mark.parametrize(('there', 'gone'), [(4.0, -5.0), (None, None)],
+@pytest.mark.parametrize(('there', 'gone'), [((4.0, 0.06), (-5.0, 0.2)), ((), ())],
                          ids=['measured', 'unmeasured'])
 def test_thresholds_suit_what_was_fitted(monitor, there, gone):
-    clear, nothing = Evidence(10.0, 1.0, there), Evidence(1.0, 0.0, gone)
+    clear, nothing = Evidence(10.0, 1.0, *there), Evidence(1.0, 0.0, *gone)
+    assert monitor.start(clear).state is TrackState.TRACKING
     assert state_after(monitor, clear, 20) is TrackState.TRACKING
     assert state_after(monitor, nothing) is TrackState.UNCERTAIN
     assert state_after(monitor, nothing, PresenceConfig().lost_frames) is TrackState.LOST
-    assert state_after(monitor, clear) is TrackState.TRACKING
+    assert state_after(monitor, clear, 7) is TrackState.TRACKING
 
 
-def test_target_that_the_network_hardly_knows_is_known_within_a_second(monitor):
-    """It is just certain at first; what is usual of it counts as much as of any other later."""
-    just = (PresenceConfig().uncertain + 1) / 2
-    odds = (np.log(just / (1 - just)) - MEASURED.constant - MEASURED.likeness) / MEASURED.presence
-    hardly = Evidence(10.0, 1.0, float(odds))
-    assert monitor.assess(hardly).score == pytest.approx(just) and odds < 3
-    assert state_after(monitor, hardly, 25) is TrackState.TRACKING
-    # All but a tenth of what its odds lack is made up for.
-    assert monitor.assess(hardly).presence == pytest.approx(4.0, abs=0.1 * (4 - odds))
-    assert monitor.assess(hardly).score > PresenceConfig().found
+def test_target_that_the_network_does_not_know_is_tracked_by_its_edges(monitor):
+    """Odds of 0 from the start on, but edges as sure as of any other target."""
+    unknown = Evidence(10.0, 1.0, 0.0, 0.06)
+    assert monitor.start(unknown).state is TrackState.TRACKING
+    assert state_after(monitor, unknown, 30) is TrackState.TRACKING
+
+
+def test_start_where_nothing_has_edges_is_no_start_on_a_target(monitor):
+    """Sharp and alike as only what is seen a moment after it was learned."""
+    ground = Evidence(10.0, 1.0, 1.0, 0.19)
+    assert monitor.start(ground).state is TrackState.UNCERTAIN
+    assert monitor.assess(ground).score < 0.5
+    assert state_after(monitor, ground, 30) is not TrackState.TRACKING
+
+
+def test_noise_that_is_new_in_each_frame_is_lost_at_once(monitor):
+    noise = Evidence(6.0, 1.0, 1.0, 0.17)
+    monitor.start(noise)
+    later = Evidence(4.0, 0.2, -2.0, 0.18)
+    assert state_after(monitor, later, PresenceConfig().lost_frames) is TrackState.LOST

@@ -20,7 +20,7 @@ from unittest.mock import create_autospec, Mock
 import numpy as np
 import pytest
 
-from lmsco_ros.core import BoundingBox, TrackState
+from lmsco_ros.core import BoundingBox
 from lmsco_ros.core.config import SearchConfig
 from lmsco_ros.core.imaging.gain import IntensityRange
 from lmsco_ros.core.imaging.regions import search_tiles
@@ -35,6 +35,7 @@ IMAGE_SIZE, SIDE = (320, 240), 80.0
 CONFIG = SearchConfig(candidates=2, tiles=3)
 LAST = BoundingBox.from_center((60, 50), (20, 16))
 EXPECTED = BoundingBox.from_center((70, 60), (20, 16))
+AHEAD = BoundingBox.from_center((300, 30), (20, 16))
 # More than there are turns for: two in each of three frames.
 SALIENT = [BoundingBox.from_center((40 * n + 20, 200 - 10 * n), (14, 11)) for n in range(7)]
 
@@ -44,6 +45,7 @@ class Observer:
 
     def __init__(self):
         self.seen, self.looked, self.asked, self.distractors = {}, [], [], []
+        self.measured, self.presence = [], {}
         self.detected, self.followed = [], []
 
     def put(self, place, **what):
@@ -62,6 +64,10 @@ class Observer:
         return SimpleNamespace(box=box, detection=detection,
                                assessment=SimpleNamespace(score=score, place=box.center))
 
+    def measure(self, outlook, box):
+        self.measured.append(box)
+        return self.presence.get(box.center, -1.0)
+
     def is_distractor(self, outlook, detection):
         self.asked.append(detection.center)
         return detection.center in self.distractors
@@ -79,8 +85,9 @@ def observer():
 def monitor():
     """Return a monitor in which the target is lost and everything convinces."""
     monitor = create_autospec(PresenceMonitor, instance=True)
-    monitor.state, monitor.after_cut = TrackState.LOST, False
-    monitor.convincing.return_value = True
+    monitor.hurried, monitor.after_cut = False, False
+    monitor.convincing.return_value = monitor.hints.return_value = True
+    monitor.present.side_effect = lambda presence: presence >= 0
     return monitor
 
 
@@ -96,7 +103,7 @@ def salience(monkeypatch):
 @pytest.fixture
 def outlook():
     image = np.zeros(IMAGE_SIZE[::-1], np.uint8)
-    return Outlook(FrameView(image, IntensityRange(0, 1)), LAST, EXPECTED)
+    return Outlook(FrameView(image, IntensityRange(0, 1)), LAST, EXPECTED, AHEAD)
 
 
 @pytest.fixture
@@ -113,7 +120,8 @@ def redetect(observer, monitor, salience, outlook, here):
     redetection = Redetection(CONFIG, observer, monitor, outlook.view, LAST)
 
     def search(misses=0, after_shutter=False):
-        for made in (observer.detected, observer.looked, observer.asked, observer.followed):
+        for made in (observer.detected, observer.looked, observer.asked, observer.followed,
+                     observer.measured):
             made.clear()
         return redetection(outlook, here, misses, after_shutter=after_shutter)
     search.restart = redetection.restart
@@ -139,12 +147,54 @@ def test_distractors_are_watched_first(redetect, observer, outlook):
     assert observer.followed == [outlook]
 
 
-@pytest.mark.parametrize('misses, chosen', [(0, slice(0, 2)), (4, slice(2, 4)), (2, slice(4, 6))])
-def test_lost_target_is_looked_for_at_salient_places_in_turn(
-        redetect, observer, salience, outlook, misses, chosen):
+NEARBY = [BoundingBox.from_center(place, (14, 11)) for place in ((90, 60), (60, 95), (70, 70))]
+FURTHER = [BoundingBox.from_center(place, (14, 11)) for place in ((290, 40), (250, 20))]
+
+
+@pytest.mark.parametrize('misses, measured', [
+    (6, NEARBY[0]), (8, FURTHER[0]), (10, SALIENT[1]), (16, SALIENT[2])])
+def test_lost_target_is_measured_at_salient_places_nearby_ahead_and_anywhere(
+        redetect, observer, salience, outlook, misses, measured):
+    salience.candidates.return_value = SALIENT + NEARBY + FURTHER
     redetect(misses)
-    assert observer.detected == observer.looked == SALIENT[chosen]
-    salience.candidates.assert_called_once_with(outlook.view, EXPECTED, 6, (1.0,))
+    assert observer.measured == [measured] and observer.detected == []
+    salience.candidates.assert_called_once_with(outlook.view, EXPECTED, 48, (1.0,))
+
+
+def test_filter_looks_where_the_network_is_surest_to_see_the_target(
+        observer, monitor, salience, outlook, here):
+    redetection = Redetection(SearchConfig(candidates=6), observer, monitor, outlook.view, LAST)
+    observer.presence = {SALIENT[0].center: 0.5, SALIENT[1].center: 2.0}
+    observer.put(SALIENT[1].center, score=0.9)
+    assert redetection(outlook, here, 4, after_shutter=False).box == SALIENT[1]
+    assert observer.measured == SALIENT[:3]
+    assert observer.detected == observer.looked == [SALIENT[1]]
+
+
+def test_filter_looks_at_the_most_salient_place_where_nothing_measures(redetect, observer):
+    observer.presence = dict.fromkeys((box.center for box in SALIENT), None)
+    redetect(10)
+    assert observer.detected == [SALIENT[1]]
+
+
+def test_blunt_tile_is_not_looked_at_again_while_lost(redetect, observer, monitor):
+    monitor.hints.side_effect = lambda sharpness: sharpness >= 4.0
+    observer.put(tiles()[0], sharpness=3.9)
+    observer.put(tiles()[3], sharpness=4.1)
+    redetect(7)
+    assert len(observer.detected) == 3 and observer.looked == []
+    redetect(9)
+    assert observer.looked == [EXPECTED.moved_to(tiles()[3])]
+
+
+def test_lost_frames_cost_no_more_than_one_and_a_half_looks(redetect, observer, monitor):
+    """Beside the look at the expected place; a measurement costs half of what a filter does."""
+    monitor.hints.return_value = False
+    cost = 0.0
+    for misses in range(6, 66):
+        redetect(misses)
+        cost += len(observer.detected) * 2 / CONFIG.tiles + len(observer.measured) / 2
+    assert cost / 60 <= 1.5
 
 
 def test_every_other_frame_of_a_lost_target_searches_tiles(redetect, observer, salience):
@@ -158,11 +208,9 @@ def test_every_other_frame_of_a_lost_target_searches_tiles(redetect, observer, s
     assert {box.size for box in searched} == {EXPECTED.size}
 
 
-@pytest.mark.parametrize('state', [TrackState.TRACKING, TrackState.UNCERTAIN])
 @pytest.mark.parametrize('misses', [1, 4])
-def test_target_that_is_not_lost_yet_is_looked_for_everywhere(
-        redetect, observer, monitor, state, misses):
-    monitor.state = state
+def test_target_that_was_just_seen_is_looked_for_everywhere(redetect, observer, monitor, misses):
+    monitor.hurried = True
     redetect(misses)
     assert observer.detected[:2] == SALIENT[2:4]
     assert places(observer.detected[2:5]) == tiles()[:3]
@@ -179,7 +227,7 @@ def test_two_slices_are_searched_after_the_shutter_and_the_salient_places(
 def test_other_sizes_are_considered_after_a_cut(redetect, monitor, salience, outlook):
     monitor.after_cut = True
     redetect()
-    salience.candidates.assert_called_once_with(outlook.view, EXPECTED, 6, (1.0, 0.7, 1.4))
+    salience.candidates.assert_called_once_with(outlook.view, EXPECTED, 48, (1.0, 0.7, 1.4))
 
 
 def test_restarted_search_begins_with_the_nearest_tiles(redetect, observer):
@@ -201,7 +249,7 @@ def test_sharpest_tile_is_looked_at_again_where_its_peak_is(redetect, observer):
 
 
 def test_what_convinces_most_is_taken_for_the_target(redetect, observer, monitor):
-    monitor.state = TrackState.UNCERTAIN
+    monitor.hurried = True
     observer.put(SALIENT[0].center, score=0.7)
     observer.put(SALIENT[1].center, score=0.8)
     assert redetect().box == SALIENT[1]
@@ -213,13 +261,15 @@ def test_what_convinces_most_is_taken_for_the_target(redetect, observer, monitor
 
 
 def test_next_best_is_taken_where_the_best_does_not_convince(redetect, observer, monitor):
+    monitor.hurried = True
     observer.put(SALIENT[0].center, score=0.7)
     observer.put(SALIENT[1].center, score=0.8)
     monitor.convincing.side_effect = lambda assessment: assessment.place == SALIENT[0].center
     assert redetect().box == SALIENT[0]
 
 
-def test_distractor_is_not_taken_for_the_target(redetect, observer, here):
+def test_distractor_is_not_taken_for_the_target(redetect, observer, monitor, here):
+    monitor.hurried = True
     observer.put(SALIENT[0].center, score=0.7)
     observer.put(SALIENT[1].center, score=0.8)
     observer.distractors = [SALIENT[1].center]
@@ -229,7 +279,8 @@ def test_distractor_is_not_taken_for_the_target(redetect, observer, here):
 
 
 @pytest.mark.parametrize('score', [0.5, 0.4])
-def test_what_is_not_better_elsewhere_stays_here(redetect, observer, here, score):
+def test_what_is_not_better_elsewhere_stays_here(redetect, observer, monitor, here, score):
+    monitor.hurried = True
     observer.put(SALIENT[0].center, score=score)
     assert redetect() is here
     assert observer.asked == []

@@ -45,18 +45,23 @@ def test_restarted_search_starts_anew():
     assert Schedule(SearchConfig(tiles=0)).tiles(SIZE, 80, (200, 50), 1) == []
 
 
-def test_salient_places_take_turns_and_then_alternate_with_slices():
-    schedule = Schedule(SearchConfig(candidates=4, tiles=2))
+def test_salient_places_take_turns_while_it_hurries():
+    schedule = Schedule(SearchConfig(candidates=4))
     assert schedule.candidates == 12
-    hurried = [schedule.turn(misses, hurried=True, after_shutter=False) for misses in range(4)]
-    assert hurried == [Turn(range(0, 4), 1), Turn(range(4, 8), 1), Turn(range(8, 12), 1),
-                       Turn(range(0, 4), 1)]
-    calm = [schedule.turn(misses, hurried=False, after_shutter=False) for misses in range(6)]
-    assert [turn.slices for turn in calm] == [0, 1, 0, 1, 0, 1]
-    assert [turn.salient for turn in calm[::2]] == [range(0, 4), range(8, 12), range(4, 8)]
-    assert not any(turn.salient for turn in calm[1::2])
+    assert [schedule.salient(misses) for misses in range(4)] == [
+        range(0, 4), range(4, 8), range(8, 12), range(0, 4)]
 
 
-def test_two_slices_are_searched_after_a_closed_shutter():
-    turn = Schedule(SearchConfig()).turn(0, hurried=True, after_shutter=True)
-    assert turn == Turn(range(0, 4), 2)
+def test_lost_target_is_looked_for_nearby_then_ahead_then_anywhere_and_in_slices_between():
+    schedule = Schedule(SearchConfig())
+    assert [schedule.turn(misses) for misses in range(6, 14)] == [
+        Turn.NEAR, Turn.TILES, Turn.AHEAD, Turn.TILES, Turn.ANYWHERE, Turn.TILES,
+        Turn.NEAR, Turn.TILES]
+
+
+@pytest.mark.parametrize('candidates, count', [(4, 2), (5, 3), (1, 1), (0, 0)])
+def test_half_of_the_salient_places_are_measured_and_all_get_their_turn(candidates, count):
+    schedule = Schedule(SearchConfig(candidates=candidates))
+    chosen = [schedule.measured(misses) for misses in range(4, 4 + 6 * 12, 6)]
+    assert {len(places) for places in chosen} == {count}
+    assert set().union(*chosen) >= set(range(schedule.candidates))

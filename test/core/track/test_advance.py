@@ -21,6 +21,7 @@ import numpy as np
 import pytest
 
 from lmsco_ros.core import BoundingBox, BoxError, TimeError, TrackerConfig, TrackState
+from lmsco_ros.core import course as course_module
 from lmsco_ros.core import track as track_module
 from lmsco_ros.core.config import LearningConfig, PresenceConfig, ScaleConfig
 from lmsco_ros.core.detection.detector import Detection
@@ -43,14 +44,18 @@ MOVED = START.moved_to((53, 35))
 REGION = BoundingBox(0, 0, 80, 80)
 SEARCHED = ScaleConfig(step=1.25, exponent_min=-1, exponent_max=0, rate=1)
 FIRST_RANGE, RANGE = IntensityRange(0, 1), IntensityRange(10, 20)
-PLAIN = FrameCondition(RANGE, shutter_closed=False, inverted=False, cut=False)
+PLAIN = FrameCondition(RANGE, shutter_closed=False, inverted=False, cut=False, noise=0.03)
 SHUT, CUT = replace(PLAIN, shutter_closed=True), replace(PLAIN, cut=True)
 BELIEVED = Verdict(0.8, TrackState.TRACKING, believed=True, learns=True)
 DOUBTED = Verdict(0.4, TrackState.UNCERTAIN, believed=True, learns=False)
 MISSED = Verdict(0.1, TrackState.UNCERTAIN, believed=False, learns=False)
+PROMISING = replace(MISSED, score=0.9, promising=True)
+FIRST = Verdict(0.95, TrackState.TRACKING, believed=True, learns=True)
+VAGUE = Verdict(0.2, TrackState.UNCERTAIN, believed=True, learns=False, note='vague')
 CLASSES = {'gain': 'AutomaticGain', 'detector': 'Detector', 'extent': 'EdgeFilter',
            'monitor': 'PresenceMonitor', 'observer': 'Observer', 'prediction': 'Prediction',
            'redetection': 'Redetection', 'motion': 'TargetState'}
+ELSEWHERE = {'Prediction': course_module, 'TargetState': course_module}
 
 
 def sighting(center, presence, peak=3.0, box=START):
@@ -59,7 +64,7 @@ def sighting(center, presence, peak=3.0, box=START):
     grid = np.arange(25.0).reshape(5, 5) * peak
     found = Detection(REGION, Peak(displacement[::-1], 0, peak, grid, np.array([peak, 1.0])),
                       [], np.zeros((3, 2)), 10.0)
-    return Sighting(box, found, Assessment(Evidence(10.0, 1.0, presence), 1.0, presence, 0.8),
+    return Sighting(box, found, Assessment(Evidence(10.0, 1.0, presence, 0.1), 1.0, 1.0, 0.8, 0.9),
                     Measurement(np.zeros((2, 2)), np.ones((2, 2)), presence))
 
 
@@ -87,13 +92,14 @@ def parts(monkeypatch):
     """Replace all that a track is made of; attributes are the parts, and calls are in order."""
     parts = Mock()
     for name, kind in CLASSES.items():
-        part = create_autospec(getattr(track_module, kind), instance=True)
+        module = ELSEWHERE.get(kind, track_module)
+        part = create_autospec(getattr(module, kind), instance=True)
         parts.attach_mock(part, name)
-        monkeypatch.setattr(track_module, kind, Mock(return_value=part))
+        monkeypatch.setattr(module, kind, Mock(return_value=part))
     parts.gain.examine.return_value = replace(PLAIN, intensity=FIRST_RANGE)
     parts.detector.return_value = sighting(START.center, 4.0, peak=2.0).detection
     parts.monitor.believable.return_value = True
-    parts.monitor.judge.return_value = BELIEVED
+    parts.monitor.judge.return_value, parts.monitor.start.return_value = BELIEVED, FIRST
     parts.observer.look.return_value, parts.redetection.return_value = Seen(HERE), THERE
     parts.prediction.expected.return_value, parts.prediction.misses = AHEAD, 0
     parts.extent.side_effect = lambda box, measured: box
@@ -132,7 +138,8 @@ def test_plain_frame_is_seen_judged_followed_and_learned_in_this_order(parts, tr
     parts.reset_mock()
     advance(track, frame())
     assert names(parts) == [
-        'motion.predict', 'gain.examine', 'prediction.expected', 'observer.look',
+        'motion.predict', 'gain.examine', 'monitor.note_noise', 'prediction.expected',
+        'observer.look',
         'monitor.believable', 'monitor.judge', 'extent', 'prediction.seen',
         'redetection.restart', 'observer.keep', 'motion.measure', 'detector.remember',
         'detector.train', 'prediction.expected', 'detector.watch']
@@ -151,13 +158,13 @@ def test_target_is_looked_for_where_it_is_expected_at_the_searched_scales(parts)
     advance(track, shown)
     view = FrameView(shown.image, RANGE)
     parts.observer.look.assert_called_once_with(
-        Outlook(view, START, AHEAD), scale_factors(SEARCHED))
+        Outlook(view, START, AHEAD, MOVED), scale_factors(SEARCHED))
     assert parts.prediction.expected.call_args_list[0] == call(START, (120, 100))
 
 
 def test_others_are_told_with_where_the_target_goes_itself(parts, track):
     parts.prediction.velocity = (3.0, -2.0)
-    assert track.heading == (53, 33)
+    assert track.course.heading == (53, 33)
     advance(track, frame(), None, [(70, 40), (90, 20)])
     assert parts.observer.look.call_args.args[0].neighbors == Neighbors(
         (53, 33), ((70, 40), (90, 20)))
@@ -195,7 +202,7 @@ def test_what_is_not_believable_is_searched_elsewhere_and_that_is_judged(parts, 
     shown = frame()
     result = advance(track, shown)
     assert parts.redetection.call_args_list == [call(
-        Outlook(FrameView(shown.image, RANGE), START, AHEAD), HERE, 7, after_shutter=False)]
+        Outlook(FrameView(shown.image, RANGE), START, AHEAD, MOVED), HERE, 7, after_shutter=False)]
     parts.monitor.judge.assert_called_once_with(THERE.assessment)
     parts.detector.remember.assert_called_once_with(THERE.detection, pytest.approx((20, 60)))
     assert result.box.center == pytest.approx(THERE.detection.center)
@@ -237,9 +244,9 @@ def test_frames_of_a_closed_shutter_are_not_counted(parts, track):
 def test_after_a_cut_nothing_is_expected_before_the_target_is_looked_for(parts, track):
     parts.gain.examine.return_value = CUT
     advance(track, frame())
-    assert names(parts)[1:9] == [
-        'gain.examine', 'monitor.note_cut', 'prediction.stop', 'redetection.restart',
-        'observer.forget', 'motion.forget_place', 'prediction.expected', 'observer.look']
+    assert names(parts)[1:10] == [
+        'gain.examine', 'monitor.note_noise', 'monitor.note_cut', 'redetection.restart',
+        'observer.forget', 'prediction.stop', 'motion.forget_place', 'prediction.expected', 'observer.look']
     parts.motion.forget_place.assert_called_once_with((120, 100))
 
 
@@ -336,7 +343,7 @@ def test_size_is_searched_and_then_measured(parts):
     assert result.box.center == pytest.approx((52, 36)) and result.box.size == (24, 12)
 
 
-def test_box_follows_the_measurement_and_the_sample_a_part_of_the_way(parts, track):
+def test_box_and_sample_follow_the_measurement(parts, track):
     parts.extent.side_effect = lambda box, measured: box.moved_to((57, 31))
     result = advance(track, frame())
     assert result.box.center == pytest.approx((57, 31))
@@ -421,7 +428,8 @@ def test_told_box_is_the_visible_part(parts, track):
 
 
 def test_parts_are_made_of_the_first_frame(parts, monkeypatch):
-    made = {name: getattr(track_module, kind) for name, kind in CLASSES.items()}
+    made = {name: getattr(ELSEWHERE.get(kind, track_module), kind)
+            for name, kind in CLASSES.items()}
     make_meter, shown = Mock(), frame()
     monkeypatch.setattr(track_module.ExtentMeter, 'marked', make_meter)
     networks = Networks(extent='network')
@@ -441,10 +449,58 @@ def test_parts_are_made_of_the_first_frame(parts, monkeypatch):
     parts.prediction.seen.assert_called_once_with(START.center, False)
     parts.observer.keep.assert_called_once_with(view, START)
     parts.detector.watch.assert_called_once_with(view, START)
-    assert (track.result.box, track.result.score) == (START, 1.0)
+    assert (track.result.box, track.result.score) == (START, FIRST.score)
     assert track.result.state is TrackState.TRACKING and track.result.search_region == REGION
     # The target of the first frame scores 1.
     assert track.result.confidence_map.max() == 24
+
+
+def test_noise_of_every_frame_is_noted(parts, track):
+    advance(track, frame())
+    parts.monitor.note_noise.assert_called_once_with(0.03)
+
+
+def test_start_is_judged_by_what_speaks_for_the_first_frame(parts):
+    shown = frame()
+    track = Track(CONFIG, 'backend', Networks(), shown, START)
+    parts.observer.introduce.assert_called_once_with(FrameView(shown.image, FIRST_RANGE), START)
+    parts.monitor.start.assert_called_once_with(parts.observer.introduce.return_value)
+    assert names(parts).index('monitor.note_noise') < names(parts).index('monitor.start')
+    assert track.result.note == '' and advance(track, frame()).note == ''
+
+
+def test_what_a_person_should_know_is_told_with_every_verdict(parts):
+    parts.monitor.start.return_value = VAGUE
+    track = Track(CONFIG, 'backend', Networks(), frame(), START)
+    assert (track.result.score, track.result.state) == (VAGUE.score, VAGUE.state)
+    assert track.result.note == 'vague'
+    parts.observer.keep.assert_not_called()
+    parts.monitor.judge.return_value = replace(DOUBTED, note='still vague')
+    assert advance(track, frame()).note == 'still vague'
+    parts.monitor.judge.return_value = BELIEVED
+    assert advance(track, frame()).note == ''
+
+
+def test_what_is_promising_is_looked_for_where_it_was_and_in_its_size(parts, track):
+    promised = sighting((90, 70), 2.5, box=START.scaled(2))
+    parts.observer.look.return_value = Seen(promised)
+    parts.monitor.judge.return_value = PROMISING
+    assert advance(track, frame()).box == START
+    parts.monitor.judge.return_value = MISSED
+    advance(track, frame())
+    looked = parts.observer.look.call_args.args[0]
+    assert looked.expected.center == pytest.approx((90, 70)) and looked.expected.size == (40, 20)
+    assert looked.last == START
+    advance(track, frame())
+    assert parts.observer.look.call_args.args[0].expected == AHEAD
+
+
+def test_promise_of_another_view_is_none(parts, track):
+    parts.monitor.judge.return_value = PROMISING
+    advance(track, frame())
+    parts.gain.examine.return_value = CUT
+    advance(track, frame())
+    assert parts.observer.look.call_args.args[0].expected == AHEAD
 
 
 def test_nothing_is_measured_without_a_network(parts):

@@ -59,7 +59,7 @@ def test_twin_that_remains_is_not_taken_for_the_target(scene):
     results = [tracker.update(gone(n)) for n in range(6, 26)]
     assert TrackState.TRACKING not in {result.state for result in results}
     assert results[-1].state is TrackState.LOST
-    back = [tracker.update(frame(n)) for n in range(26, 29)][-1]
+    back = [tracker.update(frame(n)) for n in range(26, 35)][-1]
     assert back.state is TrackState.TRACKING
     assert back.box.center == pytest.approx(START, abs=1.0)
 
@@ -67,7 +67,7 @@ def test_twin_that_remains_is_not_taken_for_the_target(scene):
 def test_target_that_jumps_where_nothing_was_is_followed(scene):
     elsewhere = (START[0] + 50, START[1] + 20)
     tracker = started(scene, resting(scene))
-    results = [tracker.update(resting(scene, elsewhere)(n)) for n in range(6, 12)]
+    results = [tracker.update(resting(scene, elsewhere)(n)) for n in range(6, 15)]
     assert results[-1].state is TrackState.TRACKING
     assert results[-1].box.center == pytest.approx(elsewhere, abs=1.0)
 
@@ -75,8 +75,10 @@ def test_target_that_jumps_where_nothing_was_is_followed(scene):
 def test_target_of_another_view_is_found_soon(scene, make_scene):
     other, elsewhere = make_scene((240, 160), 5), (START[0] + 110, START[1] + 40)
     tracker = started(scene, resting(scene))
-    results = [tracker.update(resting(other, elsewhere)(n)) for n in range(6, 10)]
-    assert results[1].state is not TrackState.LOST
+    results = [tracker.update(resting(other, elsewhere)(n)) for n in range(6, 16)]
+    # Its old place is of a view that is no more; two frames have to agree on the new one.
+    assert results[0].state is TrackState.LOST
+    assert results[2].state is not TrackState.LOST
     assert results[-1].state is TrackState.TRACKING
     assert results[-1].box.center == pytest.approx(elsewhere, abs=1.5)
 
@@ -101,14 +103,15 @@ def test_target_leaves_the_image_and_comes_back(scene):
     assert back[-1].box.center == pytest.approx((x[0], START[1]), abs=1.5)
 
 
-def test_target_that_got_away_behind_the_shutter_is_found_at_once(scene):
+def test_target_that_got_away_behind_the_shutter_is_found_with_the_second_frame(scene):
     frame = resting(scene)
     tracker = started(scene, frame)
     for _ in range(10):
         assert tracker.update(frame(5)).state is TrackState.TRACKING
     elsewhere = (START[0] + 70, START[1] + 25)
-    result = tracker.update(resting(scene, elsewhere)(6))
-    assert result.state is TrackState.TRACKING
+    tracker.update(resting(scene, elsewhere)(6))
+    result = tracker.update(resting(scene, elsewhere)(7))
+    assert result.state is not TrackState.LOST
     assert result.box.center == pytest.approx(elsewhere, abs=1.5)
 
 

@@ -112,10 +112,11 @@ def test_size_is_kept_where_the_target_is_found_again(make_scene):
     for n in range(4):
         gone = tracker.update(scene.frame(pan=(n / 10, 0)))
     assert gone.state is TrackState.LOST
-    results = (tracker.update(scene.frame((121.6, 86.2), pan=(n / 10, 0))) for n in range(4, 8))
-    back = next(result for result in results if result.state is TrackState.TRACKING)
+    results = (tracker.update(scene.frame((121.6, 86.2), pan=(n / 10, 0))) for n in range(4, 12))
+    back = next(result for result in results if result.state is not TrackState.LOST)
     assert back.box.center == pytest.approx((121.6, 86.2), abs=1.5)
-    assert back.box.width == pytest.approx(gone.box.width, rel=1e-6)
+    # By one step of the scale at most, which the second of the two frames that agree searches.
+    assert back.box.width == pytest.approx(gone.box.width, rel=0.01)
 
 
 @pytest.mark.parametrize('name', ['paper', 'mas', 'ma', 'a'])

@@ -161,7 +161,7 @@ def test_target_is_lost_and_found_again_elsewhere(make_scene, elsewhere):
     assert states[-1] is TrackState.LOST
     assert gone.box.overlap(trusted) > 0.5
     assert gone.score < 0.5 * result.score + 0.25
-    for n in range(6):
+    for n in range(12):
         back = tracker.update(scene.frame(elsewhere, pan=(n / 10, 0)))
     assert back.state is TrackState.TRACKING
     assert back.box.center == pytest.approx(elsewhere, abs=1.0)
