@@ -20,7 +20,6 @@ from collections.abc import Sequence
 
 from lmsco_ros.core.backend import Backend
 from lmsco_ros.core.config import TrackerConfig
-from lmsco_ros.core.course import Course
 from lmsco_ros.core.detection.detector import Detection, Detector
 from lmsco_ros.core.detection.precision import box_covariance
 from lmsco_ros.core.detection.scale import scale_factors
@@ -35,6 +34,7 @@ from lmsco_ros.core.presence.evidence import Verdict
 from lmsco_ros.core.presence.monitor import PresenceMonitor
 from lmsco_ros.core.presence.neighbors import Neighbors
 from lmsco_ros.core.presence.observer import Observer, Outlook, Sighting
+from lmsco_ros.core.search.course import Course
 from lmsco_ros.core.search.redetection import Redetection
 from lmsco_ros.core.types import BoundingBox, TrackResult, TrackState
 from lmsco_ros.core.weights.loading import Networks
@@ -54,10 +54,8 @@ class Track:
         Where the filter is computed.
     networks : Networks
         What the configuration asks for.
-    frame : FrameSurvey
-        First frame.
-    box : BoundingBox
-        Target in the first frame.
+    frame, box : FrameSurvey, BoundingBox
+        First frame, and the target in it.
     time : float, optional
         When that frame was taken, in seconds; None where frames have no times.
 
@@ -72,8 +70,7 @@ class Track:
     def __init__(self, config: TrackerConfig, backend: Backend, networks: Networks,
                  frame: FrameSurvey, box: BoundingBox, time: float | None = None) -> None:
         check_box(box, (frame.image.shape[1], frame.image.shape[0]))
-        self.course = Course(box, time)
-        self._config = config
+        self.course, self._config = Course(box, time), config
         self._box, self._frame, self._after_shutter = box, 0, False
         self._gain = AutomaticGain(config.intensity)
         condition = self._gain.examine(frame)
@@ -117,9 +114,9 @@ class Track:
         self._frame += 1
         self._monitor.note_noise(condition.noise)
         if condition.cut:
-            others = ()
             self._expect_nothing(view)
-        neighbors = Neighbors(self.course.heading, tuple(others)) if others else None
+        known = others and not condition.cut
+        neighbors = Neighbors(self.course.heading, tuple(others)) if known else None
         outlook = Outlook(view, self._box, self.course.expected(view.size),
                           self.course.predicted, neighbors)
         sighting = yield from self._look(outlook)

@@ -15,6 +15,8 @@
 
 """Health figures are computed from what happened, on a clock that the test moves."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -41,6 +43,14 @@ def outcome(phase=Phase.TRACKED, state=TrackState.TRACKING, *, live=True, error=
     frame = PendingFrame(None, 0, 0.0)
     return Outcome(frame, phase, {3: result} if phase is Phase.TRACKED else {}, 3, live, error,
                    0.006, 0.010, **more)
+
+
+def test_note_of_a_result_is_told_with_its_state():
+    noted = outcome(state=TrackState.UNCERTAIN)
+    noted.results[3] = replace(noted.results[3], note='start: nothing stands out')
+    status, = frame_statuses(noted, 0, 0.02, lambda result: Readings())
+    assert status.message == (
+        'uncertain: found, but not learned from; start: nothing stands out')
 
 
 def report(monitor, **values):

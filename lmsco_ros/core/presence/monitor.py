@@ -97,7 +97,8 @@ class PresenceMonitor:
         stands_out = seen.score >= self.config.certain
         self._state = TrackState.TRACKING if stands_out else TrackState.UNCERTAIN
         self._doubtful = not stands_out
-        return Verdict(seen.score, self._state, believed=True, learns=stands_out, note=self._note())
+        return Verdict(seen.score, self._state, believed=True, learns=stands_out,
+                       note=self._note())
 
     def note_noise(self, noise: float) -> None:
         """Take note of the noise of the next frame, its deviation in the working range."""
@@ -181,10 +182,11 @@ class PresenceMonitor:
         if self._promised and not near:
             return True
         if self._promised or self.after_cut or self._needs_another(seen):
-            return not (near and seen.belief >= _LIKELY) and not self.convincing(seen)
-        if seen.evidence.jump > JUMP or self._probation > 0:
-            return seen.belief < _LIKELY
-        return seen.belief < self.config.lost or self._doubtful and seen.score < _NOTHING
+            likely = near and seen.belief >= _LIKELY and not self._doubtful
+            return not likely and not self.convincing(seen)
+        doubted = seen.evidence.jump > JUMP or self._probation > 0
+        return (seen.belief < (_LIKELY if doubted else self.config.lost)
+                or self._doubtful and seen.score < _NOTHING)
 
     def _needs_another(self, seen: Assessment) -> bool:
         """Return whether another frame has to agree: not with what stayed through a cut."""

@@ -173,7 +173,8 @@ class Observer:
             outlook.view, box.moved_to(detection.center)))
         likeness = self._detector.likeness(detection) / self._first_likeness
         jump = math.dist(detection.center, outlook.expected.center) / outlook.expected.area**0.5
-        evidence = Evidence(detection.sharpness, likeness, *_told(measured, box), jump)
+        presence, vagueness = _told(measured, box)
+        evidence = Evidence(detection.sharpness, likeness, presence, vagueness, jump)
         return Sighting(box, detection, self._monitor.assess(evidence), measured)
 
     def is_distractor(self, outlook: Outlook, detection: Detection) -> bool:

@@ -110,8 +110,9 @@ class Redetection:
         turn = self._schedule.turn(misses)
         if turn is Turn.TILES:
             sharpest = self._tiles(outlook, here, 1)
-            again = sharpest is not None and self._monitor.hints(sharpest.sharpness)
-            return [self._look_again(outlook, sharpest)] if again else []
+            if sharpest is None or not self._monitor.hints(sharpest.sharpness):
+                return []
+            return [self._look_again(outlook, sharpest)]
         chosen = self._schedule.measured(misses)
         places = self._salient(outlook, _MANY) if chosen else []
         if turn is Turn.ANYWHERE:

@@ -23,7 +23,8 @@ from lmsco_ros.core.config import IntensityConfig
 from lmsco_ros.core.errors import ImageError
 from lmsco_ros.core.imaging.gain import AutomaticGain, IntensityRange, survey
 from lmsco_ros.core.imaging.pixels import measured, without_dead_pixels
-from lmsco_ros.core.imaging.sampled import credible_values, percentiles, take_probe
+from lmsco_ros.core.imaging.sampled import (
+    credible_values, noise_deviation, percentiles, take_probe)
 from lmsco_ros.core.imaging.scene_change import (
     same_picture, scene_pattern, SceneChange, SceneMonitor)
 
@@ -272,3 +273,27 @@ def test_measured_pixels_stay_and_others_are_copied():
     assert image[3, 5] == np.float32(1.01e12) and clean.dtype == np.float32
     counts = np.full((20, 20), 65535, np.uint16)
     assert measured(counts) is counts
+
+
+@pytest.mark.parametrize('shape', [(60, 80), (240, 320), (512, 640), (4, 9000)])
+@pytest.mark.parametrize('deviation', [0.5, 6.0])
+def test_noise_is_measured_whatever_the_scene(shape, deviation):
+    rng = np.random.default_rng(1)
+    ramp = np.add.outer(3.0 * np.arange(shape[0]), 0.5 * np.arange(shape[1]))
+    image = (ramp + deviation * rng.normal(size=shape)).astype(np.float32)
+    image[:, shape[1] // 2:] += 500.0
+    assert noise_deviation(image) == pytest.approx(deviation, rel=0.15)
+
+
+def test_noise_of_nothing_is_none():
+    assert noise_deviation(np.full((20, 20), np.nan, np.float32)) == 0.0
+    assert noise_deviation(np.zeros((20, 2), np.uint8)) == 0.0
+    assert noise_deviation(np.zeros((40, 50, 3), np.uint8)) == 0.0
+
+
+def test_noise_is_told_in_the_working_range():
+    image = np.random.default_rng(2).normal(1000, 10, (200, 200)).astype(np.float32)
+    gain = AutomaticGain(IntensityConfig())
+    condition = gain.examine(survey(image, IntensityConfig()))
+    # Of the 1st to the 99th percentile: 4.65 deviations.
+    assert condition.noise == pytest.approx(1 / 4.65, rel=0.1)

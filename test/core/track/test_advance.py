@@ -21,7 +21,6 @@ import numpy as np
 import pytest
 
 from lmsco_ros.core import BoundingBox, BoxError, TimeError, TrackerConfig, TrackState
-from lmsco_ros.core import course as course_module
 from lmsco_ros.core import track as track_module
 from lmsco_ros.core.config import LearningConfig, PresenceConfig, ScaleConfig
 from lmsco_ros.core.detection.detector import Detection
@@ -34,6 +33,7 @@ from lmsco_ros.core.networks.together import at_once
 from lmsco_ros.core.presence.evidence import Assessment, Evidence, Verdict
 from lmsco_ros.core.presence.neighbors import Neighbors
 from lmsco_ros.core.presence.observer import Outlook, Sighting
+from lmsco_ros.core.search import course as course_module
 from lmsco_ros.core.track import Track
 from lmsco_ros.core.weights.loading import Networks
 
@@ -246,7 +246,8 @@ def test_after_a_cut_nothing_is_expected_before_the_target_is_looked_for(parts, 
     advance(track, frame())
     assert names(parts)[1:10] == [
         'gain.examine', 'monitor.note_noise', 'monitor.note_cut', 'redetection.restart',
-        'observer.forget', 'prediction.stop', 'motion.forget_place', 'prediction.expected', 'observer.look']
+        'observer.forget', 'prediction.stop', 'motion.forget_place', 'prediction.expected',
+        'observer.look']
     parts.motion.forget_place.assert_called_once_with((120, 100))
 
 

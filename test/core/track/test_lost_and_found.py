@@ -115,6 +115,54 @@ def test_target_that_got_away_behind_the_shutter_is_found_with_the_second_frame(
     assert result.box.center == pytest.approx(elsewhere, abs=1.5)
 
 
+def noise(seed, shape=(160, 240)):
+    """Return white noise."""
+    return np.random.default_rng(seed).normal(7600, 150, shape).astype(np.uint16)
+
+
+@pytest.mark.parametrize('run', range(4))
+def test_pattern_that_does_not_repeat_is_told_and_lost(run):
+    tracker = LMSCOTracker()
+    result = tracker.initialize(noise((run, 0)), BoundingBox.from_center(START, SIZE))
+    assert result.note == 'start: nothing stands out' and result.score < 0.5
+    results = [tracker.update(noise((run, n))) for n in range(1, 31)]
+    assert TrackState.TRACKING not in {result.state for result in results}
+    assert results[-1].state is TrackState.LOST
+
+
+def test_ground_that_stands_out_by_nothing_is_told(scene):
+    tracker, frame = LMSCOTracker(), resting(scene, None)
+    results = [tracker.initialize(frame(0), BoundingBox.from_center((150.3, 90.2), SIZE))]
+    results += [tracker.update(frame(n)) for n in range(1, 20)]
+    assert {result.note for result in results} == {'start: nothing stands out'}
+    assert max(result.score for result in results) < 0.5
+
+
+def test_still_target_that_stands_out_stays_tracked(scene):
+    tracker, image = LMSCOTracker(), scene.frame(START, SIZE)
+    rng = np.random.default_rng(5)
+    results = [tracker.initialize(image, BoundingBox.from_center(START, SIZE))]
+    results += [tracker.update(image + rng.integers(0, 3, image.shape).astype(np.uint16))
+                for _ in range(40)]
+    assert {result.state for result in results} == {TrackState.TRACKING}
+    assert {result.note for result in results} == {''}
+
+
+def test_target_in_sudden_noise_is_not_lost(scene):
+    """The sharpness falls for good, as the noise lets expect, and nothing else does."""
+    tracker, rng = LMSCOTracker(), np.random.default_rng(6)
+    frame = resting(scene)
+    tracker.initialize(frame(0), BoundingBox.from_center(START, SIZE))
+    for n in range(1, 40):
+        image = frame(n).astype(float)
+        if n >= 12:
+            middle = np.median(image)
+            image = middle + 0.5 * (image - middle) + 60 * rng.normal(size=image.shape)
+        result = tracker.update(image.astype(np.uint16))
+        assert result.state is not TrackState.LOST
+    assert result.box.center == pytest.approx(START, abs=3)
+
+
 def test_paper_follows_every_frame(scene):
     config = TrackerConfig.from_dict({
         **CONFIG.to_dict(), 'presence': TrackerConfig.preset('paper').to_dict()['presence']})
