@@ -15,6 +15,7 @@
 """What docs/extent.md and training/README.md say of networks and fusion is what there is."""
 
 import csv
+from dataclasses import astuple
 from importlib import import_module
 from pathlib import Path
 import re
@@ -23,7 +24,7 @@ import sys
 import pytest
 
 from lmsco_ros.core.extent import fusion
-from lmsco_ros.core.presence.trust import MEASURED, UNMEASURED
+from lmsco_ros.core.presence import trust
 from lmsco_ros.core.weights.registry import find_source
 from training.extent.bodies import PLANS
 
@@ -116,8 +117,8 @@ def test_constants_of_the_fusion_are_those_of_the_code():
 def test_coefficients_on_the_card_are_those_of_the_code():
     told = [[number(figure) for figure in figures]
             for _, *figures in rows(CARD, 'coefficients in use')]
-    assert told == [[model.quality, model.likeness, model.presence, model.constant]
-                    for model in (MEASURED, UNMEASURED)]
+    assert told == [[*astuple(model)] for model in (
+        trust.MEASURED, trust.UNMEASURED, trust.BELIEF_MEASURED, trust.BELIEF_UNMEASURED)]
 
 
 def test_all_plans_of_bodies_are_named():

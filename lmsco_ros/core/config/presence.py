@@ -58,7 +58,7 @@ class PresenceConfig:
     reference_frames: int = 10
     uncertain: float = 0.3
     certain: float = 0.5
-    lost: float = 0.3
+    lost: float = 0.2
     lost_frames: int = 5
     found: float = 0.7
     sharp: float = 0.4
