@@ -39,6 +39,9 @@ _PROBATION = 5
 
 # Belief that is enough for a jump, and to find again what has hardly moved.
 _LIKELY = 0.5
+# Part of the score that is told where nothing stood out at the start: of the ground on which
+# trackers were started, few frames seemed to be surer.
+_DOUBTED = 0.5
 # Score of a frame that shows nothing, where nothing stood out at the start.
 _NOTHING = 0.2
 
@@ -173,7 +176,8 @@ class PresenceMonitor:
             lost = given_up or self.after_cut or self._misses >= self.config.lost_frames
             self._state = TrackState.LOST if lost else TrackState.UNCERTAIN
         always = self.config.learn == 'always'
-        return Verdict(seen.score, self._state, believed=found or always, promising=promising,
+        score = _DOUBTED * seen.score if self._doubtful else seen.score
+        return Verdict(score, self._state, believed=found or always, promising=promising,
                        learns=self._state is TrackState.TRACKING or always, note=self._note())
 
     def _misses_target(self, seen: Assessment) -> bool:
@@ -198,8 +202,14 @@ class PresenceMonitor:
         return NOTHING_STANDS_OUT if self._doubtful else ''
 
     def _certain(self) -> float:
-        """Return the score from which the state is TRACKING: less for one that already is."""
+        """
+        Return the score from which the state is TRACKING.
+
+        It is less for one that already is, and more where nothing stood out at the start.
+        """
         if self._probation:
             return float('inf')
+        if self._doubtful:
+            return self.config.found
         tracking = self._state is TrackState.TRACKING
         return self.config.uncertain if tracking else self.config.certain

@@ -534,3 +534,14 @@ def test_doubted_start_is_lost_by_its_score_until_it_stands_out(monkeypatch):
         monitor.start(first)
         assert monitor.assess(nothing).score < 0.2
         assert [judge(monitor, nothing).state for _ in range(3)] == states
+
+
+def test_score_of_a_doubted_start_is_halved_until_it_convinces():
+    monitor = PresenceMonitor(CONFIG)
+    monitor.start(evidence(10.0, presence=-1.0, vagueness=0.4))
+    sure = at_score(monitor, 0.7)
+    monitor.start(evidence(10.0, presence=-1.0, vagueness=0.4))
+    verdict = monitor.judge(replace(monitor.assess(sure), score=0.79))
+    assert verdict.state is TrackState.UNCERTAIN and verdict.score == pytest.approx(0.395)
+    verdict = monitor.judge(replace(monitor.assess(sure), score=0.81))
+    assert verdict.state is TrackState.TRACKING and verdict.score == pytest.approx(0.81)
