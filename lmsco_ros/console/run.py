@@ -29,6 +29,7 @@ from rclpy.impl.implementation_singleton import rclpy_implementation
 from lmsco_ros.console.console_node import ConsoleNode
 from lmsco_ros.console.server import serving
 from lmsco_ros.console.settings import TOKEN_VARIABLE
+from lmsco_ros.extras import MissingExtraError
 from lmsco_ros.node.faults import Faults
 from lmsco_ros.node.ros_arguments import explained, StartError
 from lmsco_ros.node.run import in_ros, spin_until
@@ -63,6 +64,8 @@ def _node() -> Iterator[ConsoleNode]:
             rclpy_implementation.RCLError) as error:
         raise StartError(f'{explained(str(error))}; docs/console.md lists the parameters with '
                          'their types') from error
+    except MissingExtraError as error:
+        raise StartError(str(error)) from error
     try:
         yield node
     finally:

@@ -188,18 +188,18 @@ def test_all_that_is_shown_is_recorded(running, console, tmp_path):
     graph.spin_until(lambda: answers)
     assert answers[0][0] and str(tmp_path) in answers[0][1]
     listeners = {'/lmsco_tracker/status': 3, '/lmsco_tracker/boxes': 2, '/image_raw': 3,
-                 '/lmsco_tracker/box': 2, '/init_box_stamped': 1}
+                 '/lmsco_tracker/box': 2, '/lmsco_tracker/state': 1, '/init_box_stamped': 1}
     for publisher in (*running.node.publishers, *graph.user.publishers,
                       *running.console.publishers):
         graph.spin_until(lambda: publisher.get_subscription_count()
                          >= listeners.get(publisher.topic_name, 0))
     seen = follow(running)
     shown(running, graph.image(9))
-    # Of each frame an image and a status, of the start one more, and two boxes of each kind.
-    graph.spin_until(lambda: running.console.desk.recorded() >= 9)
+    # Of each frame an image, a status, a box of each kind and a state, of the start a status more.
+    graph.spin_until(lambda: running.console.desk.recorded() >= 11)
     running.console.record(False, lambda done, text: answers.append((done, text)))
     graph.spin_until(lambda: len(answers) == 2)
-    assert answers[1] == (True, '9 messages were recorded')
+    assert answers[1] == (True, '11 messages were recorded')
     assert running.console.desk.recorded() is None
     (bag,) = (tmp_path / 'bags').iterdir()
     with AnyReader([bag]) as reader:
@@ -208,7 +208,7 @@ def test_all_that_is_shown_is_recorded(running, console, tmp_path):
                   for connection, _, data in reader.messages()
                   if connection.topic == '/image_raw']
     assert topics == {'/image_raw', *(f'/lmsco_tracker/{name}'
-                                      for name in ('status', 'box', 'boxes'))}
+                                      for name in ('status', 'box', 'boxes', 'state'))}
     stamps = [image.header.stamp.sec * 10 ** 9 + image.header.stamp.nanosec for image in images]
     assert stamps[0] == seen.stamp and len(stamps) == 2
 
