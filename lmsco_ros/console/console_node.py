@@ -26,6 +26,7 @@ from typing import Any, TYPE_CHECKING
 from builtin_interfaces.msg import Time
 from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import Point, PointStamped, PolygonInstanceStamped, PolygonStamped
+from nav_msgs.msg import Odometry
 from rcl_interfaces.msg import ParameterDescriptor
 from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
@@ -48,6 +49,7 @@ from msg_adapters.boxes import box_from_polygon, polygon_from_box
 from msg_adapters.compressed import image_from_compressed
 from msg_adapters.errors import MessageError
 from msg_adapters.image import image_from_message
+from msg_adapters.state import state_from_odometry
 from msg_adapters.status import statuses_from_message
 
 if TYPE_CHECKING:
@@ -188,7 +190,8 @@ class ConsoleNode(Node):
 
     def _listen(self) -> None:
         for kind, name, callback in ((DiagnosticArray, 'status', self._on_status),
-                                     (PolygonInstanceStamped, 'boxes', self._on_box)):
+                                     (PolygonInstanceStamped, 'boxes', self._on_box),
+                                     (Odometry, 'state', self._on_state)):
             self.create_subscription(kind, self._of_tracker(name), self._guarded(callback),
                                      _DEPTH)
 
@@ -222,6 +225,9 @@ class ConsoleNode(Node):
         corners = PolygonStamped(header=message.header, polygon=message.polygon.polygon)
         self._assembly.add_box(_stamp(message.header), message.polygon.id,
                                box_from_polygon(corners))
+
+    def _on_state(self, message: Odometry) -> None:
+        self._assembly.add_state(_stamp(message.header), state_from_odometry(message))
 
     def _on_map(self, message: Image) -> None:
         self._assembly.add_confidence(_stamp(message.header), image_from_message(message))

@@ -219,6 +219,15 @@ class Page:
         chain.move_to_element_with_offset(self.canvas, round(left), round(top))
         chain.click_and_hold().move_by_offset(round(width), round(height)).release().perform()
 
+    def click(self, box):
+        """Click on the middle of a box given in pixels of the image."""
+        place = json.loads(self.canvas.get_attribute('data-place'))
+        at = [place[start] + place['scale'] * (box[axis] + box[axis + 2] / 2)
+              for axis, start in enumerate(('left', 'top'))]
+        ActionChains(self.browser, duration=20).move_to_element_with_offset(
+            self.canvas, *(round(value - self.canvas.size[side] / 2)
+                           for value, side in zip(at, ('width', 'height')))).click().perform()
+
     def start(self, site):
         """Pause, drag a box around the target in the frame that is shown, and go on."""
         self.pause()
@@ -260,15 +269,63 @@ def test_drag_starts_a_track_that_stays_on_the_target(page, site):
     page.start(site)
     overlaps = {}
     deadline = time.monotonic() + PATIENCE
-    while len(overlaps) < 60 and time.monotonic() < deadline:
+    # For five seconds of the camera.
+    while not overlaps or max(overlaps) - min(overlaps) < 5e9:
+        assert time.monotonic() < deadline
         state = page.state
-        if state['state'] == 'tracking':
-            overlaps[state['stamp']] = overlap(state['targets'][0]['box'],
-                                               site.box(state['stamp']))
-    assert len(overlaps) == 60 and np.mean(list(overlaps.values())) > 0.5
+        assert state['state'] in ('tracking', 'uncertain')
+        overlaps[int(state['stamp'])] = overlap(state['targets'][0]['box'],
+                                                site.box(state['stamp']))
+    assert len(overlaps) > 30 and np.mean(list(overlaps.values())) > 0.5
     assert min(overlaps.values()) > 0.2
     assert 'tracking' in page.text('state') and '°C' in page.text('heat')
     assert ' tracking' in page.canvas.get_attribute('aria-label')
+
+
+def test_click_starts_on_what_is_there_and_is_answered(page, site):
+    page.pause()
+    truth = site.box(page.state['stamp'])
+    page.click(truth)
+    # The view stands still; the answer comes all the same.
+    page.until(lambda: 'is followed' in page.text('answer'))
+    page.key(' ')
+    page.until(lambda: page.state['state'] == 'tracking')
+    state = page.state
+    box = state['targets'][0]['box']
+    x, y, width, height = site.box(state['stamp'])
+    assert box[0] < x + width / 2 < box[0] + box[2] and box[1] < y + height / 2 < box[1] + box[3]
+
+
+def test_start_that_is_refused_is_told_with_its_reason(page, site):
+    page.pause()
+    seen = page.state['stamp']
+    # The tracker keeps frames for two seconds, and no more than 64.
+    page.until(lambda: int(max(site.truth, key=int)) - int(seen) > 5e9)
+    page.drag(site.box(seen))
+    page.until(lambda: 'stamp' in page.text('answer'))
+    assert 'refused' in page.browser.find_element(By.ID, 'answer').get_attribute('class')
+    page.key(' ')
+    page.until(lambda: page.state['state'] == 'idle')
+    page.until(lambda: 'start refused' in page.text('history'))
+
+
+def test_start_that_nobody_answers_is_told(page, site):
+    site.order(site.kill_tracker)
+    page.until(lambda: 'tracker says nothing' in page.text('banner'))
+    page.click((5, 5, 20, 20))
+    page.until(lambda: 'asked the tracker' in page.text('answer'))
+    page.until(lambda: 'has not answered' in page.text('answer'))
+    site.order(site.start_tracker)
+    page.until(lambda: page.state['state'] == 'idle')
+
+
+def test_what_happened_before_is_history_and_no_news(page, site, address):
+    page.start(site)
+    page.until(lambda: 'started' in page.text('history'))
+    with open_browser() as browser:
+        other = Page(browser, address)
+        other.until(lambda: 'started' in other.text('history'))
+        assert other.text('answer') == ''
 
 
 def test_box_is_drawn_where_the_state_says(page, site):
@@ -297,7 +354,9 @@ def test_lost_and_found_are_shown(page, site):
     site.hidden = True
     page.until(lambda: page.state['state'] == 'lost')
     page.until(lambda: 'lost' in page.text('banner'))
-    assert page.state['targets'][0]['box'] is None
+    (target,) = page.state['targets']
+    assert target['box'] is None and target['expected']['axes'][0] > 0
+    page.until(lambda: page.text('position').startswith('about ') and 'px/s' in page.text('speed'))
     site.hidden = False
     page.until(lambda: page.state['state'] == 'tracking')
     page.until(lambda: not page.text('banner'))
@@ -424,7 +483,8 @@ def test_accessibility_checker_finds_nothing(page, site, scheme):
     page.browser.execute_script(Path(os.environ['LMSCO_AXE']).read_text())
     for hidden, state in ((False, 'tracking'), (True, 'lost')):
         site.hidden = hidden
-        page.until(lambda: page.state['state'] == state)
+        # The other target may be lost at any time: there is nothing to see of it.
+        page.until(lambda: state in {each['state'] for each in page.state['targets']})
         found = page.browser.execute_async_script(
             'axe.run().then(arguments[0]);')
         assert not [(each['id'], each['nodes'][0]['target']) for each in found['violations']]

@@ -53,8 +53,8 @@ def watched(running, console):
     graph = running.graph
     graph.spin_until(lambda: running.images.get_subscription_count() == 2)
     # The test itself listens to the status, too.
-    listeners = {'/lmsco_tracker/status': 2, '/lmsco_tracker/boxes': 1, '/init_box_stamped': 1,
-                 '/select': 1}
+    listeners = {'/lmsco_tracker/status': 2, '/lmsco_tracker/boxes': 1,
+                 '/lmsco_tracker/state': 1, '/init_box_stamped': 1, '/select': 1}
     for publisher in (*running.node.publishers, *running.console.publishers):
         graph.spin_until(lambda: publisher.get_subscription_count()
                          >= listeners.get(publisher.topic_name, 0))
@@ -126,6 +126,19 @@ def test_lost_and_found_are_shown(watched):
     assert kinds == ['accepted', 'lost', 'found']
 
 
+def test_states_are_shown_with_their_frame_also_while_lost(watched):
+    follow(watched)
+    watched.fake.states = [TrackState.TRACKING, TrackState.LOST]
+    for _ in range(2):
+        moment = shown(watched, watched.graph.image())
+        (state,) = moment.states.values()
+        # The fake expects the target two pixels to the right of its box and one below.
+        expected = watched.fake.results[1].predicted_box.center
+        assert state.track_id == 1 and state.velocity == (30, -15)
+        assert state.center == pytest.approx(expected)
+    assert moment.statuses[0].state == 'lost' and moment.boxes == {}
+
+
 def test_point_and_selection_are_published(graph, console):
     node = console()
     points, numbers = graph.listen(PointStamped, 'init_point'), graph.listen(UInt32, 'select')
@@ -188,7 +201,7 @@ def test_all_that_is_shown_is_recorded(running, console, tmp_path):
     graph.spin_until(lambda: answers)
     assert answers[0][0] and str(tmp_path) in answers[0][1]
     listeners = {'/lmsco_tracker/status': 3, '/lmsco_tracker/boxes': 2, '/image_raw': 3,
-                 '/lmsco_tracker/box': 2, '/lmsco_tracker/state': 1, '/init_box_stamped': 1}
+                 '/lmsco_tracker/box': 2, '/lmsco_tracker/state': 2, '/init_box_stamped': 1}
     for publisher in (*running.node.publishers, *graph.user.publishers,
                       *running.console.publishers):
         graph.spin_until(lambda: publisher.get_subscription_count()

@@ -69,6 +69,7 @@ export class Stage {
     pen.imageSmoothingEnabled = scale < 3;
     pen.drawImage(this.image, left, top, scale * this.state.width, scale * this.state.height);
     for (const target of this.state.targets) {
+      if (target.expected && target.state !== 'tracking') this.drawExpected(target, left, top, scale);
       if (target.box) this.drawTarget(target, left, top, scale);
     }
     if (this.start && this.end) this.drawDrag(left, top, scale);
@@ -89,6 +90,27 @@ export class Stage {
     pen.restore();
     const score = target.score === null ? '' : ` ${target.score.toFixed(2)}`;
     this.label(`${target.id} ${target.state}${score}`, left + x, top + y, height);
+  }
+
+  /** The ellipse in which a target is expected that is not seen well. */
+  drawExpected({ id, box, expected }, left, top, scale) {
+    const pen = this.context;
+    const [x, y] = [left + scale * expected.center[0], top + scale * expected.center[1]];
+    const [long, short] = expected.axes.map(axis => Math.max(3, scale * axis));
+    pen.save();
+    pen.beginPath();
+    pen.rect(left, top, scale * this.state.width, scale * this.state.height);
+    pen.clip();
+    pen.beginPath();
+    pen.ellipse(x, y, long, short, expected.turn, 0, 2 * Math.PI);
+    for (const [color, width] of [['rgba(0, 0, 0, .75)', 3.5], ['#fff', 1.5]]) {
+      pen.strokeStyle = color;
+      pen.lineWidth = width;
+      pen.setLineDash([2, 4]);
+      pen.stroke();
+    }
+    pen.restore();
+    if (!box) this.label(`${id} expected here`, x, y - short, 2 * short);
   }
 
   label(text, x, y, height) {
