@@ -23,7 +23,10 @@ import json
 import os
 from pathlib import Path
 import queue
+import re
 import shutil
+import subprocess
+import sys
 import threading
 import time
 
@@ -57,6 +60,7 @@ from lmsco_ros.node.tracker_node import TrackerNode  # noqa: E402
 from lmsco_ros.synthetic import render_scene, SceneConfig  # noqa: E402
 from msg_adapters.image import message_from_image  # noqa: E402
 
+REPOSITORY = Path(__file__).resolve().parents[2]
 PATIENCE = 100.0
 PLOT = SceneConfig(width=320, height=256, frames=150, clutter=15)
 # Until here the target walks alone; then others cross its way.
@@ -459,6 +463,65 @@ def test_page_comes_back_when_the_server_does(site, browser):
         number = page.state['number']
         page.until(lambda: page.state['number'] > number)
         browser.get('about:blank')
+
+
+@pytest.fixture
+def run(tmp_path):
+    """Return what runs a program of the package, and tells what that wrote."""
+    started = []
+
+    def begin(module, *arguments):
+        log = tmp_path / f'{len(started)}.log'
+        with log.open('w') as file:
+            process = subprocess.Popen(
+                [sys.executable, '-m', module, '--ros-args', *arguments], cwd=REPOSITORY,
+                stdout=file, stderr=subprocess.STDOUT)
+        started.append(process)
+        return process, log.read_text
+    yield begin
+    for process in started:
+        process.kill()
+        process.wait()
+
+
+def test_page_comes_back_after_the_console_was_killed(site, browser, run):
+    def offered(port):
+        process, told = run('lmsco_ros.console.main', '-p', f'port:={port}')
+        deadline = time.monotonic() + PATIENCE
+        while 'the page is at' not in told():
+            assert time.monotonic() < deadline and process.poll() is None, told()
+            time.sleep(0.05)
+        return process, re.search(r'http://127.0.0.1:(\d+)/', told())
+
+    process, address = offered(0)
+    page = Page(browser, address[0])
+    process.kill()
+    page.until(lambda: page.text('link') == 'not connected')
+    assert 'does not answer' in page.text('banner')
+    number = page.state['stamp']
+    offered(address[1])
+    page.until(lambda: page.text('link') == 'connected')
+    page.until(lambda: int(page.state['stamp']) > int(number) and not page.text('banner'))
+    page.start(site)
+    browser.get('about:blank')
+
+
+def test_page_shows_a_tracker_that_was_killed_by_force_and_started_again(page, site, run):
+    site.order(site.kill_tracker)
+    page.until(lambda: 'tracker says nothing' in page.text('banner'))
+    process, _ = run('lmsco_ros.node.main')
+    page.until(lambda: not page.text('banner'))
+    page.start(site)
+    process.kill()
+    page.until(lambda: 'tracker says nothing' in page.text('banner'))
+    process, _ = run('lmsco_ros.node.main')
+    page.until(lambda: page.state['state'] == 'idle')
+    page.until(lambda: not page.text('banner'))
+    page.start(site)
+    process.kill()
+    page.until(lambda: 'tracker says nothing' in page.text('banner'))
+    site.order(site.start_tracker)
+    page.until(lambda: page.state['state'] == 'idle')
 
 
 @pytest.mark.parametrize('size', [(1280, 800), (390, 844), (844, 390)])
