@@ -205,6 +205,7 @@ class ConsoleNode(Node):
         return wrapper
 
     def _on_image(self, decode: Callable, message: Image | CompressedImage) -> None:
+        is_first = self.desk.images.last is None
         self.desk.images.count()
         try:
             image = decode(message)
@@ -212,10 +213,15 @@ class ConsoleNode(Node):
             self.get_logger().warning(f'an image cannot be shown: {error}',
                                       throttle_duration_sec=5.0)
             return
+        if is_first:
+            height, width = image.shape[:2]
+            self.get_logger().info(f'images come, {width} x {height} pixels')
         self._assembly.add_image(_stamp(message.header), image)
 
     def _on_status(self, message: DiagnosticArray) -> None:
         statuses = tuple(statuses_from_message(message))
+        if self.desk.answers.last is None:
+            self.get_logger().info(f'{self.settings.tracker} answers')
         self.desk.answers.count()
         stamp = _stamp(message.header)
         self.desk.chronicle.hear(stamp, statuses)

@@ -250,6 +250,15 @@ def test_images_are_shown_without_a_tracker(graph, console):
     assert node.desk.images.silence > 0 and node.desk.answers.silence is None
 
 
+def test_log_tells_when_images_and_answers_begin_once(watched, monkeypatch):
+    told = []
+    monkeypatch.setattr(type(watched.console.get_logger()), 'info',
+                        lambda self, text, **more: told.append(text))
+    for value in (1, 2):
+        shown(watched, watched.graph.image(value))
+    assert told == ['images come, 64 x 48 pixels', 'lmsco_tracker answers']
+
+
 def test_compressed_images_are_shown(graph, console):
     from msg_adapters.compressed import compressed_from_image
     node = console(image_transport='compressed')
