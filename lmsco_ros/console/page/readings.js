@@ -42,7 +42,7 @@ function position(box, expected) {
 function heat(target) {
   const celsius = target && target.celsius;
   const reading = celsius || (target && target.counts);
-  write('heat-name', celsius ? 'Temperature' : 'Value');
+  if (reading) write('heat-name', celsius ? 'Temperature' : 'Value');
   const digits = celsius ? 1 : 0;
   write('heat', reading ? `${reading.mean.toFixed(digits)}${celsius ? ' °C' : ''} (${
     reading.minimum.toFixed(digits)} to ${reading.maximum.toFixed(digits)})` : NONE);

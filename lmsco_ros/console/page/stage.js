@@ -103,6 +103,10 @@ export class Stage {
     pen.clip();
     pen.beginPath();
     pen.ellipse(x, y, long, short, expected.turn, 0, 2 * Math.PI);
+    pen.moveTo(x - 8, y);
+    pen.lineTo(x + 8, y);
+    pen.moveTo(x, y - 8);
+    pen.lineTo(x, y + 8);
     for (const [color, width] of [['rgba(0, 0, 0, .75)', 3.5], ['#fff', 1.5]]) {
       pen.strokeStyle = color;
       pen.lineWidth = width;
@@ -110,7 +114,7 @@ export class Stage {
       pen.stroke();
     }
     pen.restore();
-    if (!box) this.label(`${id} expected here`, x, y - short, 2 * short);
+    if (!box) this.label(`${id} expected about here`, x, y, 0);
   }
 
   label(text, x, y, height) {
@@ -118,7 +122,8 @@ export class Stage {
     pen.font = '600 13px system-ui, "DejaVu Sans", sans-serif';
     const width = pen.measureText(text).width + 10;
     const left = Math.max(0, Math.min(x - 1, this.canvas.clientWidth - width));
-    const top = y >= 24 ? y - 23 : y + height + 4;
+    const beside = y >= 24 ? y - 23 : y + height + 4;
+    const top = Math.max(0, Math.min(beside, this.canvas.clientHeight - 19));
     pen.fillStyle = 'rgba(0, 0, 0, .78)';
     pen.fillRect(left, top, width, 19);
     pen.fillStyle = '#fff';
