@@ -93,6 +93,8 @@ def unknown(given: Iterable[str], known: Iterable[str],
     ----------
     given, known : iterable of str
         Names of parameters.
+    listed_in : str
+        Where a user finds them all.
 
     """
     known = sorted(known)
