@@ -306,7 +306,7 @@ def test_start_that_is_refused_is_told_with_its_reason(page, site):
     # The tracker keeps frames for two seconds, and no more than 64.
     page.until(lambda: int(max(site.truth, key=int)) - int(seen) > 5e9)
     page.drag(site.box(seen))
-    page.until(lambda: 'stamp' in page.text('answer'))
+    page.until(lambda: 'too old' in page.text('answer'))
     assert 'refused' in page.browser.find_element(By.ID, 'answer').get_attribute('class')
     page.key(' ')
     page.until(lambda: page.state['state'] == 'idle')
