@@ -31,6 +31,7 @@ from rosbags.typesys import get_typestore, Stores
 from sensor_msgs.msg import CompressedImage, Image
 
 from lmsco_ros.replay.bags.output import BagOutput
+from lmsco_ros.replay.bags.uninterrupted import uninterrupted
 from lmsco_ros.replay.errors import OutputError
 from lmsco_ros.replay.storage import Storage
 
@@ -146,11 +147,12 @@ class Recorder:
             if self._counts is None:
                 return
             try:
-                output.write(connection, self._node.get_clock().now().nanoseconds, data)
+                # What is in the bag is counted, whenever a signal comes.
+                with uninterrupted():
+                    output.write(connection, self._node.get_clock().now().nanoseconds, data)
+                    self._counts[connection.topic] += 1
             except OutputError as error:
                 self._give_up(error)
-            else:
-                self._counts[connection.topic] += 1
         return take
 
     def _give_up(self, error: OutputError) -> None:
