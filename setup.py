@@ -48,6 +48,7 @@ setup(
         (f'share/{PACKAGE}', ['package.xml']),
         (f'share/{PACKAGE}/config', sorted(glob('config/*.*'))),
         (f'share/{PACKAGE}/config/cameras', sorted(glob('config/cameras/*.yaml'))),
+        (f'share/{PACKAGE}/config/viewers', sorted(glob('config/viewers/*.*'))),
         (f'share/{PACKAGE}/launch', sorted(glob('launch/*.launch.py'))),
     ],
     # colcon cannot read what setuptools makes of the same in pyproject.toml.

@@ -132,7 +132,10 @@ def compressed_from_image(image: npt.NDArray, *, codec: str = 'png',
         raise ImageMessageError(
             f'{codec} cannot hold {image.dtype} pixels; use '
             + ('png for 16 bit' if image.dtype == np.uint16 else 'sensor_msgs/Image'))
-    _, data = cv2.imencode('.png' if codec == 'png' else '.jpg', image)
+    done, data = cv2.imencode('.png' if codec == 'png' else '.jpg', image)
+    if not done:
+        raise ImageMessageError(f'{codec} cannot hold {image.shape[1]} x {image.shape[0]} pixels; '
+                                'use sensor_msgs/Image')
     return CompressedImage(header=header or Header(), data=byte_array(data),
                            format=f'{encoding}; {codec} compressed {encoding}')
 

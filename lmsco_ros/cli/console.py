@@ -159,6 +159,13 @@ def frame_progress() -> Progress:
         console=_Terminal(stderr=True))
 
 
+def message_progress() -> Progress:
+    """Return a progress display that counts messages without an end, on standard error."""
+    return Progress(
+        TextColumn('{task.description:<12}'), TextColumn('{task.completed:.0f} messages'),
+        TimeElapsedColumn(), console=_Terminal(stderr=True))
+
+
 class _Terminal(Console):
     """A console whose reader may leave while work goes on: results are in files."""
 

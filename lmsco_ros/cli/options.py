@@ -68,3 +68,10 @@ ConfigOption = Annotated[Path | None, typer.Option(
     help='YAML file with a tracker configuration, in place of the preset.')]
 FramesOption = Annotated[int | None, typer.Option(
     '--frames', min=1, max=MOST_FRAMES, show_default=False, help='Only the first N frames.')]
+ImageTopicOption = Annotated[str, typer.Option(
+    '--image-topic', help='Images of the camera, those that the tracker gets.')]
+CompressedOption = Annotated[bool, typer.Option(
+    '--compressed', help='Take the compressed images, on /compressed below their topic.')]
+TrackerOption = Annotated[str, typer.Option('--tracker', help='Name of the tracker node.')]
+NamespaceOption = Annotated[str, typer.Option(
+    '--namespace', help='Namespace, that of the tracker.')]

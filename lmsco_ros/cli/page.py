@@ -16,6 +16,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 from pathlib import Path
 import threading
@@ -24,7 +25,8 @@ from typing import Annotated
 import typer
 
 from lmsco_ros.cli.console import fail, FAILED, MISUSED, plain_errors, say, telling_what_is_kept
-from lmsco_ros.cli.options import TopicOption
+from lmsco_ros.cli.options import (
+    CompressedOption, ImageTopicOption, NamespaceOption, TopicOption, TrackerOption)
 from lmsco_ros.cli.ros import require_ros
 from lmsco_ros.extras import require_extra
 from lmsco_ros.replay.storage import Storage
@@ -47,10 +49,14 @@ def page(
         show_default=False,
         help='Folder of a new bag that gets the marked boxes at the end.')] = None,
     topic: TopicOption = '',
-    image_topic: Annotated[str, typer.Option(
-        help='Images to show, those that the tracker gets.')] = 'image_raw',
-    tracker: Annotated[str, typer.Option(help='Name of the tracker node.')] = 'lmsco_tracker',
-    namespace: Annotated[str, typer.Option(help='Namespace, that of the tracker.')] = '/',
+    image_topic: ImageTopicOption = 'image_raw',
+    compressed: CompressedOption = False,
+    tracker: TrackerOption = 'lmsco_tracker',
+    namespace: NamespaceOption = '/',
+    record_folder: Annotated[Path | None, typer.Option(
+        file_okay=False, show_default=False,
+        help='Folder for bags that are recorded from the page. Without it there is no such '
+             'button.')] = None,
     host: Annotated[str, typer.Option(
         help='Where the page is offered. Any but this machine needs a token in '
              'LMSCO_CONSOLE_TOKEN.')] = '127.0.0.1',
@@ -68,8 +74,11 @@ def page(
             return
     if bag is not None or topic:
         fail('--bag and --topic are for a recording; give one', MISUSED)
-    _watch(namespace, image_topic, {'tracker': tracker, 'host': host, 'port': port,
-                                    'read_only': str(read_only).lower()})
+    _watch(namespace, image_topic, {
+        'tracker': tracker, 'host': host, 'port': port, 'read_only': str(read_only).lower(),
+        'image_transport': 'compressed' if compressed else 'raw',
+        # As YAML reads it, whatever is in the name.
+        **({'record_folder': json.dumps(str(record_folder.absolute()))} if record_folder else {})})
 
 
 def _watch(namespace: str, image_topic: str, values: dict[str, object]) -> None:

@@ -17,15 +17,16 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-import contextlib
+from datetime import datetime
 import functools
 from pathlib import Path
 import threading
-from typing import Any
+from typing import Any, TYPE_CHECKING
 
 from builtin_interfaces.msg import Time
 from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import Point, PointStamped, PolygonInstanceStamped, PolygonStamped
+from nav_msgs.msg import Odometry
 from rcl_interfaces.msg import ParameterDescriptor
 from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
@@ -41,7 +42,6 @@ from lmsco_ros.console.feed import Feed, Rate
 from lmsco_ros.console.frames import LiveFrames
 from lmsco_ros.console.moments import Assembly, Moment
 from lmsco_ros.console.picture import Pictures
-from lmsco_ros.console.recorder import Recorder
 from lmsco_ros.console.settings import ConsoleSettings
 from lmsco_ros.extras import require_extra
 from lmsco_ros.replay.errors import OutputError
@@ -49,7 +49,11 @@ from msg_adapters.boxes import box_from_polygon, polygon_from_box
 from msg_adapters.compressed import image_from_compressed
 from msg_adapters.errors import MessageError
 from msg_adapters.image import image_from_message
+from msg_adapters.state import state_from_odometry
 from msg_adapters.status import statuses_from_message
+
+if TYPE_CHECKING:
+    from lmsco_ros.replay.recorder import Recorder
 
 _DEPTH = 10
 _TICK_SECONDS = 0.1
@@ -89,12 +93,12 @@ class ConsoleNode(Node):
         self._maps: Subscription | None = None
         pictures = Pictures()
         topic = self._subscribe_images()
+        recorder = self._recorder = self._make_recorder(topic)
         self._feed = Feed(self.settings.history_megabytes)
         self.desk = Desk(
             lambda: LiveFrames(self._feed), Chronicle(pictures.thumbnail), pictures, self,
             Rate(), Rate(), topic, self.settings.read_only,
-            recorded=(lambda: self._recorder.count) if self.settings.record_folder else None)
-        self._recorder = self._make_recorder()
+            recorded=None if recorder is None else lambda: recorder.count)
         self._orders: list[tuple[bool, Answer]] = []
         self._assembly = Assembly(self._deliver)
         self._listen()
@@ -108,8 +112,11 @@ class ConsoleNode(Node):
 
     def destroy_node(self) -> None:
         """Finish what is recorded, and take the node away."""
-        with contextlib.suppress(OutputError):
-            self._recorder.stop()
+        if self._recorder is not None and self._recorder.count is not None:
+            try:
+                self._record(False)
+            except OutputError as error:
+                self.get_logger().error(str(error))
         super().destroy_node()
 
     def start(self, stamp: int, box: tuple[float, float, float, float]) -> None:
@@ -134,7 +141,7 @@ class ConsoleNode(Node):
 
     def record(self, on: bool, answer: Answer) -> None:
         """Begin or end a recording at the next tick."""
-        if not self.settings.record_folder:
+        if self._recorder is None:
             answer(False, 'the console was started without a folder for recordings; set '
                    'record_folder')
             return
@@ -153,15 +160,17 @@ class ConsoleNode(Node):
             name: self.declare_parameter(name, getattr(defaults, name), read_only).value
             for name in defaults.__dataclass_fields__})
 
-    def _make_recorder(self) -> Recorder:
-        """Return what records all that a page shows."""
-        if self.settings.record_folder:
-            require_extra('cli', 'a recording', 'rosbags')
-        images = CompressedImage if self.settings.image_transport == 'compressed' else Image
-        return Recorder(self, Path(self.settings.record_folder), {
-            self.desk.image_topic: images, self._of_tracker('status'): DiagnosticArray,
-            self._of_tracker('box'): PolygonStamped,
-            self._of_tracker('boxes'): PolygonInstanceStamped})
+    def _make_recorder(self, image_topic: str) -> Recorder | None:
+        """Return what records all that a page shows, where pages may."""
+        if not self.settings.record_folder:
+            return None
+        require_extra('cli', 'a recording', 'rosbags')
+        from lmsco_ros.replay.recorder import live_topics, Recorder
+
+        return Recorder(
+            self, live_topics(image_topic, self.settings.tracker,
+                              compressed=self.settings.image_transport == 'compressed'),
+            lambda error: self.get_logger().error(f'the recording ends: {error}'))
 
     def _of_tracker(self, name: str) -> str:
         return f'{self.settings.tracker}/{name}'
@@ -181,7 +190,8 @@ class ConsoleNode(Node):
 
     def _listen(self) -> None:
         for kind, name, callback in ((DiagnosticArray, 'status', self._on_status),
-                                     (PolygonInstanceStamped, 'boxes', self._on_box)):
+                                     (PolygonInstanceStamped, 'boxes', self._on_box),
+                                     (Odometry, 'state', self._on_state)):
             self.create_subscription(kind, self._of_tracker(name), self._guarded(callback),
                                      _DEPTH)
 
@@ -195,6 +205,7 @@ class ConsoleNode(Node):
         return wrapper
 
     def _on_image(self, decode: Callable, message: Image | CompressedImage) -> None:
+        is_first = self.desk.images.last is None
         self.desk.images.count()
         try:
             image = decode(message)
@@ -202,10 +213,15 @@ class ConsoleNode(Node):
             self.get_logger().warning(f'an image cannot be shown: {error}',
                                       throttle_duration_sec=5.0)
             return
+        if is_first:
+            height, width = image.shape[:2]
+            self.get_logger().info(f'images come, {width} x {height} pixels')
         self._assembly.add_image(_stamp(message.header), image)
 
     def _on_status(self, message: DiagnosticArray) -> None:
         statuses = tuple(statuses_from_message(message))
+        if self.desk.answers.last is None:
+            self.get_logger().info(f'{self.settings.tracker} answers')
         self.desk.answers.count()
         stamp = _stamp(message.header)
         self.desk.chronicle.hear(stamp, statuses)
@@ -215,6 +231,9 @@ class ConsoleNode(Node):
         corners = PolygonStamped(header=message.header, polygon=message.polygon.polygon)
         self._assembly.add_box(_stamp(message.header), message.polygon.id,
                                box_from_polygon(corners))
+
+    def _on_state(self, message: Odometry) -> None:
+        self._assembly.add_state(_stamp(message.header), state_from_odometry(message))
 
     def _on_map(self, message: Image) -> None:
         self._assembly.add_confidence(_stamp(message.header), image_from_message(message))
@@ -242,9 +261,22 @@ class ConsoleNode(Node):
             orders, self._orders = self._orders, []
         for on, answer in orders:
             try:
-                answer(True, self._recorder.start() if on else self._recorder.stop())
+                answer(True, self._record(on))
             except OutputError as error:
                 answer(False, str(error))
+
+    def _record(self, on: bool) -> str:
+        """Begin or end a recording, and say what came of it."""
+        assert self._recorder is not None, 'others get no orders'
+        if on:
+            path = Path(self.settings.record_folder) / datetime.now().strftime(
+                'recording_%Y%m%d_%H%M%S_%f')
+            self._recorder.start(path)
+            text = f'recording into {path}'
+        else:
+            text = f'{self._recorder.stop()} messages were recorded'
+        self.get_logger().info(text)
+        return text
 
     def _call(self, client: Any, request: Any, answer: Answer) -> None:
         if not client.service_is_ready():

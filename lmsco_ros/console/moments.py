@@ -23,13 +23,14 @@ import time
 import numpy.typing as npt
 
 from msg_adapters.boxes import Box
+from msg_adapters.state import State
 from msg_adapters.status import FrameStatus
 
 FOUND = ('tracking', 'uncertain')
 # Longer than a slow tracker takes for a frame: until then, pictures wait for what it says.
 _SILENCE_SECONDS = 2.0
-# A confidence map that nobody publishes must not hold the picture up.
-_MAP_SECONDS = 0.25
+# A state or a map that nobody publishes must not hold the picture up.
+_EXTRA_SECONDS = 0.25
 _MOST_WAITING = 64
 _MOST_BYTES = 128 * 2 ** 20
 
@@ -53,6 +54,8 @@ class Moment:
         Of every target, the selected one first; empty when the tracker said nothing.
     boxes : mapping of int to Box
         By the number of the target, in pixels.
+    states : mapping of int to State
+        Where targets are expected and how they move, by their numbers; of lost ones, too.
     confidence : ndarray, shape (H, W), float32, or None
         Confidence map of the selected target.
 
@@ -64,6 +67,7 @@ class Moment:
     image: npt.NDArray
     statuses: tuple[FrameStatus, ...] = ()
     boxes: Mapping[int, Box] = field(default_factory=dict)
+    states: Mapping[int, State] = field(default_factory=dict)
     confidence: npt.NDArray | None = None
 
 
@@ -76,20 +80,24 @@ class _Parts:
     image: npt.NDArray | None = None
     statuses: tuple[FrameStatus, ...] = ()
     boxes: dict[int, Box] = field(default_factory=dict)
+    states: dict[int, State] = field(default_factory=dict)
     confidence: npt.NDArray | None = None
 
     @property
     def is_told(self) -> bool:
-        """Whether the tracker has said all but the confidence map."""
+        """Whether the tracker has said all but the states and the confidence map."""
         return bool(self.statuses) and all(
             status.track_id in self.boxes for status in self.statuses
             if status.state in FOUND)
 
-    def is_complete(self, with_map: bool) -> bool:
+    def is_complete(self, with_states: bool, with_map: bool) -> bool:
         """Whether nothing is missing any more."""
+        missing_state = with_states and any(
+            status.track_id not in self.states for status in self.statuses
+            if status.state in (*FOUND, 'lost'))
         missing_map = (with_map and self.confidence is None and bool(self.statuses)
                        and self.statuses[0].state in (*FOUND, 'lost'))
-        return self.is_told and not missing_map
+        return self.is_told and not missing_state and not missing_map
 
 
 class Assembly:
@@ -122,6 +130,7 @@ class Assembly:
         self._waiting: dict[int, _Parts] = {}
         self._images = 0
         self._heard = clock()
+        self._with_states = False
 
     def add_image(self, stamp: int, image: npt.NDArray) -> None:
         """Take the image with a stamp."""
@@ -144,6 +153,12 @@ class Assembly:
         self._parts(stamp).boxes[track_id] = box
         self.release()
 
+    def add_state(self, stamp: int, state: State) -> None:
+        """Take the state of a target in the frame with a stamp; from now on they are awaited."""
+        self._with_states = True
+        self._parts(stamp).states[state.track_id] = state
+        self.release()
+
     def add_confidence(self, stamp: int, confidence: npt.NDArray) -> None:
         """Take the confidence map of the frame with a stamp."""
         self._parts(stamp).confidence = confidence
@@ -156,8 +171,8 @@ class Assembly:
         is_silent = now - self._heard >= _SILENCE_SECONDS
         ready = [(parts.number, stamp) for stamp, parts in self._waiting.items()
                  if parts.image is not None
-                 and (is_silent or parts.is_complete(self.with_map)
-                      or parts.is_told and now - parts.received >= _MAP_SECONDS)]
+                 and (is_silent or parts.is_complete(self._with_states, self.with_map)
+                      or parts.is_told and now - parts.received >= _EXTRA_SECONDS)]
         if not ready:
             return
         number, stamp = max(ready)
@@ -166,7 +181,7 @@ class Assembly:
                          if later.image is None or later.number > number}
         assert parts.image is not None, 'only those with an image are ready'
         self._deliver(Moment(number, stamp, parts.received, parts.image, parts.statuses,
-                             dict(parts.boxes), parts.confidence))
+                             dict(parts.boxes), dict(parts.states), parts.confidence))
 
     def _parts(self, stamp: int) -> _Parts:
         return self._waiting.setdefault(stamp, _Parts())

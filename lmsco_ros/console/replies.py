@@ -23,10 +23,13 @@ import math
 import struct
 from typing import Any
 
+import numpy as np
+
 from lmsco_ros.console.chronicle import Event
 from lmsco_ros.console.desk import Desk
 from lmsco_ros.console.moments import Moment
 from lmsco_ros.console.picture import PALETTES
+from msg_adapters.state import State
 from msg_adapters.status import FrameStatus, Reading
 
 _SHOWN_MESSAGE = 400
@@ -101,7 +104,24 @@ def _target(status: FrameStatus, moment: Moment) -> dict[str, Any]:
     box = moment.boxes.get(status.track_id)
     return {'id': status.track_id, 'state': status.state, 'score': status.score,
             'box': None if box is None else list(box), 'message': status.message[:_SHOWN_MESSAGE],
-            'counts': _reading(status.target), 'celsius': _reading(status.target_celsius)}
+            'counts': _reading(status.target), 'celsius': _reading(status.target_celsius),
+            'expected': _expected(moment.states.get(status.track_id))}
+
+
+def _expected(state: State | None) -> dict[str, Any] | None:
+    """
+    Return where a target is expected, in pixels, and its speed in pixels per second.
+
+    Of the ellipse in which it is with two standard deviations: half the axes, the longer one
+    first, and by how much that is turned from x to y, in radians.
+    """
+    if state is None:
+        return None
+    variances, directions = np.linalg.eigh(state.covariance)
+    x, y = directions[:, 1]
+    return {'center': list(state.center), 'speed': math.hypot(*state.velocity),
+            'axes': [float(axis) for axis in 2 * np.sqrt(np.maximum(variances[::-1], 0))],
+            'turn': math.atan2(y, x)}
 
 
 def _reading(reading: Reading | None) -> dict[str, float] | None:

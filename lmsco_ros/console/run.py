@@ -29,9 +29,13 @@ from rclpy.impl.implementation_singleton import rclpy_implementation
 from lmsco_ros.console.console_node import ConsoleNode
 from lmsco_ros.console.server import serving
 from lmsco_ros.console.settings import TOKEN_VARIABLE
+from lmsco_ros.extras import MissingExtraError
+from lmsco_ros.node import parameter_files
 from lmsco_ros.node.faults import Faults
 from lmsco_ros.node.ros_arguments import explained, StartError
 from lmsco_ros.node.run import in_ros, spin_until
+
+_PAGE = 'docs/console.md'
 
 
 def run(arguments: Sequence[str], ending: threading.Event) -> int:
@@ -43,7 +47,7 @@ def run(arguments: Sequence[str], ending: threading.Event) -> int:
     Parameters and exit code are those of :func:`lmsco_ros.node.run.run`.
     """
     try:
-        with in_ros(arguments), _node() as node, serving(
+        with in_ros(arguments), _node(arguments) as node, serving(
                 node.desk, node.settings, os.environ.get(TOKEN_VARIABLE, '')) as address:
             node.get_logger().info(f'the page is at {address}')
             node.get_logger().info(f'waiting for images on {node.desk.image_topic}')
@@ -55,15 +59,21 @@ def run(arguments: Sequence[str], ending: threading.Event) -> int:
 
 
 @contextlib.contextmanager
-def _node() -> Iterator[ConsoleNode]:
-    """Make the node, and take it down."""
+def _node(arguments: Sequence[str]) -> Iterator[ConsoleNode]:
+    """Make the node, say what of the parameters it does not hear, and take it down."""
     try:
         node = ConsoleNode()
     except (ParameterException, NameValidationException,
             rclpy_implementation.RCLError) as error:
-        raise StartError(f'{explained(str(error))}; docs/console.md lists the parameters with '
-                         'their types') from error
+        raise StartError(f'{explained(str(error))}; {_PAGE} lists the parameters with their '
+                         'types') from error
+    except MissingExtraError as error:
+        raise StartError(str(error)) from error
     try:
+        for warning in [
+                *parameter_files.unheard(arguments, node.get_fully_qualified_name()),
+                *parameter_files.unknown(node._parameter_overrides, node._parameters, _PAGE)]:
+            node.get_logger().warning(warning)
         yield node
     finally:
         node.destroy_node()

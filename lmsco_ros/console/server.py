@@ -33,6 +33,7 @@ from lmsco_ros.node.ros_arguments import StartError
 _MOST_OPEN = 128
 _END_SECONDS = 1
 _BACKLOG = 64
+_EVERY_ADDRESS = ('0.0.0.0', '::')
 
 
 @contextlib.contextmanager
@@ -55,9 +56,8 @@ def serving(desk: Desk, settings: ConsoleSettings, token: str = '') -> Iterator[
         When it would be open to others than it should, or the port cannot be had.
 
     """
-    origins = [origin for origin in settings.allowed_origins.split(',') if origin.strip()]
     try:
-        access = Access.of_server(settings.host, token, origins)
+        access = Access.of_server(settings.host, token, settings.origins)
     except AccessError as error:
         raise StartError(str(error)) from error
     with _listening(settings.host, settings.port) as listener:
@@ -70,11 +70,17 @@ def serving(desk: Desk, settings: ConsoleSettings, token: str = '') -> Iterator[
             target=server.run, kwargs={'sockets': [listener]}, name='web', daemon=True)
         thread.start()
         try:
-            host = f'[{settings.host}]' if ':' in settings.host else settings.host
-            yield f'http://{host}:{listener.getsockname()[1]}/'
+            yield f'http://{_name(settings.host)}:{listener.getsockname()[1]}/'
         finally:
             server.should_exit = True
             thread.join()
+
+
+def _name(host: str) -> str:
+    """Return the name by which browsers find what listens on an address."""
+    if host in _EVERY_ADDRESS:
+        return socket.gethostname()
+    return f'[{host}]' if ':' in host else host
 
 
 def _listening(host: str, port: int) -> socket.socket:

@@ -17,9 +17,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from urllib.parse import urlsplit
+
+from lmsco_ros.node.ros_arguments import StartError
 
 TOKEN_VARIABLE = 'LMSCO_CONSOLE_TOKEN'
 """Of the environment, not of ROS: everybody on the graph may read parameters."""
+_TRANSPORTS = ('raw', 'compressed')
 
 
 @dataclass(frozen=True)
@@ -44,6 +48,11 @@ class ConsoleSettings:
     history_megabytes : float
         Of images that are kept for stepping back.
 
+    Raises
+    ------
+    StartError
+        When a value means nothing.
+
     """
 
     tracker: str = 'lmsco_tracker'
@@ -54,3 +63,24 @@ class ConsoleSettings:
     allowed_origins: str = ''
     record_folder: str = ''
     history_megabytes: float = 64.0
+
+    def __post_init__(self) -> None:
+        """Refuse what would be ignored later."""
+        if self.image_transport not in _TRANSPORTS:
+            raise StartError(f'image_transport is {self.image_transport!r}; expected '
+                             f'{" or ".join(_TRANSPORTS)}')
+        # NaN is no number of megabytes either.
+        if not self.history_megabytes >= 0:
+            raise StartError(f'history_megabytes is {self.history_megabytes}; expected 0 or more')
+        for origin in self.origins:
+            parts = urlsplit(origin)
+            if parts.scheme not in ('http', 'https') or not parts.netloc \
+                    or parts.path not in ('', '/'):
+                raise StartError(f'{origin!r} in allowed_origins is no origin; expected a scheme '
+                                 'and a name without a path, such as https://robot.example')
+
+    @property
+    def origins(self) -> tuple[str, ...]:
+        """The allowed origins one by one."""
+        parts = map(str.strip, self.allowed_origins.split(','))
+        return tuple(part for part in parts if part)

@@ -209,7 +209,12 @@ def _is_start(item: Item) -> bool:
 def _unknown_stamp(stamp: int | None, history: FrameHistory[PendingFrame]) -> str:
     """Say why a start on a certain frame cannot be met."""
     assert stamp is not None, 'a start without a stamp takes the newest frame'
-    first, last = history.first.stamp / NANOSECONDS, history.last.stamp / NANOSECONDS
-    return (f'no frame with the stamp {stamp / NANOSECONDS:.9f} is kept (there are '
-            f'{len(history)} from {first:.9f} to {last:.9f}); copy the stamp of the image that '
-            'the box was found in, or keep frames for longer')
+    wanted, first, last = (each / NANOSECONDS for each in (
+        stamp, history.first.stamp, history.last.stamp))
+    kept = f'{len(history)} from {first:.9f} to {last:.9f}'
+    if wanted < first:
+        return (f'no frame with the stamp {wanted:.9f} is kept: it is {first - wanted:.1f} s too '
+                f'old (there are {kept}); start on a newer one, or keep frames for longer '
+                '(frame_history_seconds)')
+    return (f'no frame with the stamp {wanted:.9f} is kept (there are {kept}); copy the stamp of '
+            'the image that the box was found in')

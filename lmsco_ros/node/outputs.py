@@ -26,7 +26,7 @@ from geometry_msgs.msg import PolygonInstanceStamped, PolygonStamped
 import numpy.typing as npt
 from rclpy.lifecycle import LifecycleNode
 from rclpy.lifecycle.publisher import LifecyclePublisher
-from sensor_msgs.msg import Image
+from sensor_msgs.msg import CompressedImage, Image
 from std_msgs.msg import Header
 from visualization_msgs.msg import ImageMarker
 
@@ -38,8 +38,11 @@ from lmsco_ros.node.state_outputs import StateOutputs
 from lmsco_ros.node.target_temperature import celsius, target_reading
 from lmsco_ros.visualization.display_range import DisplayRange
 from lmsco_ros.visualization.overlay import draw_targets, state_color
+from msg_adapters.annotations import (
+    Annotated, annotations_available, annotations_from_boxes)
 from msg_adapters.boxes import (
     detections_available, detections_from_boxes, instance_from_box, polygon_from_box, Tracked)
+from msg_adapters.compressed import compressed_from_image
 from msg_adapters.confidence import message_from_confidence
 from msg_adapters.image import message_from_image
 from msg_adapters.markers import marker_from_box, marker_removal
@@ -83,8 +86,10 @@ class Outputs:
             self._status = self._publisher(DiagnosticArray, 'status', made)
             self._confidence = self._publisher(Image, 'confidence_map', made)
             self._overlay = self._publisher(Image, 'overlay', made)
+            self._small_overlay = self._publisher(CompressedImage, 'overlay/compressed', made)
             self._marker = self._publisher(ImageMarker, 'marker', made, each)
             self._detections = self._detections_publisher(made)
+            self._annotations = self._annotations_publisher(made)
             self._made = made.pop_all()
 
     def publish(self, outcome: Outcome, dropped_frames: int) -> float:
@@ -119,11 +124,17 @@ class Outputs:
                  for number, each in found.items()], header))
         if _is_heard(self._marker):
             self._publish_outlines(outcome, found, header)
+        # They take the place of all before; late frames tell of one target alone.
+        if self._annotations is not None and outcome.live and _is_heard(self._annotations):
+            self._annotations.publish(annotations_from_boxes(
+                [_annotated(number, each) for number, each in found.items()],
+                line_width=self.settings.marker_line_width, header=header))
         if result is not None and outcome.image is not None and _is_heard(self._confidence):
             self._confidence.publish(message_from_confidence(
                 result.confidence_map, result.search_region.as_tuple(),
                 crop.full_shape(outcome.image), header))
-        if outcome.image is not None and _is_heard(self._overlay):
+        if outcome.image is not None and (
+                _is_heard(self._overlay) or _is_heard(self._small_overlay)):
             self._publish_overlay(outcome.image, results, outcome.track_id, header)
         return published
 
@@ -148,6 +159,12 @@ class Outputs:
         from vision_msgs.msg import Detection2DArray
         return self._publisher(Detection2DArray, 'detections', made)
 
+    def _annotations_publisher(self, made: contextlib.ExitStack) -> LifecyclePublisher | None:
+        if not annotations_available():
+            return None
+        from foxglove_msgs.msg import ImageAnnotations
+        return self._publisher(ImageAnnotations, 'annotations', made)
+
     def _publish_outlines(self, outcome: Outcome, found: Mapping[int, TrackResult],
                           header: Header) -> None:
         """Outline every target that is seen, and take away the outlines of the others."""
@@ -159,9 +176,8 @@ class Outputs:
             self._marker.publish(marker_removal(
                 namespace=namespace, marker_id=number, header=header))
         for number, result in found.items():
-            blue, green, red = (value / 255 for value in state_color(result.state))
             self._marker.publish(marker_from_box(
-                result.box.as_tuple(), (red, green, blue), namespace=namespace, marker_id=number,
+                result.box.as_tuple(), _rgb(result), namespace=namespace, marker_id=number,
                 line_width=self.settings.marker_line_width, header=header))
         self._outlined = self._outlined - gone | set(found)
 
@@ -179,7 +195,21 @@ class Outputs:
             return
         view = self.settings.crop.fill(self._display_range.apply(image))
         picture = draw_targets(view, results, selected, label=self.settings.overlay_label)
-        self._overlay.publish(message_from_image(picture, encoding='bgr8', header=header))
+        if _is_heard(self._overlay):
+            self._overlay.publish(message_from_image(picture, encoding='bgr8', header=header))
+        if _is_heard(self._small_overlay):
+            self._small_overlay.publish(
+                compressed_from_image(picture, codec='jpeg', header=header))
+
+
+def _annotated(number: int, found: TrackResult) -> Annotated:
+    return Annotated(found.box.as_tuple(),
+                     f'{number} {found.state.name.lower()} {found.score:.2f}', _rgb(found))
+
+
+def _rgb(found: TrackResult) -> tuple[float, float, float]:
+    blue, green, red = (value / 255 for value in state_color(found.state))
+    return red, green, blue
 
 
 def _is_heard(publisher: LifecyclePublisher) -> bool:

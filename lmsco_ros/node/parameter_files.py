@@ -84,7 +84,8 @@ def unheard(arguments: Sequence[str], node: str) -> list[str]:
     return warnings
 
 
-def unknown(given: Iterable[str], known: Iterable[str]) -> list[str]:
+def unknown(given: Iterable[str], known: Iterable[str],
+            listed_in: str = 'config/tracker.yaml') -> list[str]:
     """
     Say which parameters do not exist, each with the nearest name that does.
 
@@ -92,13 +93,15 @@ def unknown(given: Iterable[str], known: Iterable[str]) -> list[str]:
     ----------
     given, known : iterable of str
         Names of parameters.
+    listed_in : str
+        Where a user finds them all.
 
     """
     known = sorted(known)
     warnings = []
     for name in sorted(set(given).difference(known)):
         nearest = difflib.get_close_matches(name, known, n=1)
-        remedy = f'did you mean {nearest[0]}?' if nearest else 'config/tracker.yaml lists all'
+        remedy = f'did you mean {nearest[0]}?' if nearest else f'{listed_in} lists all'
         warnings.append(
             f'the parameter {shortened(name)} is unknown and changes nothing; {remedy}')
     return warnings

@@ -24,6 +24,7 @@ from lmsco_ros.console.feed import Feed, Rate
 from lmsco_ros.console.moments import Assembly
 from lmsco_ros.console.picture import Look, PALETTES, Pictures
 from msg_adapters.boxes import Box
+from msg_adapters.state import State
 
 IMAGE = np.zeros((48, 64), np.uint16)
 BOX = Box(1, 2, 3, 4)
@@ -116,6 +117,33 @@ def test_confidence_map_is_waited_for_but_not_for_long(gathered, clock, status):
     clock.now += 0.3
     assembly.release()
     assert delivered[-1].stamp == 8 and delivered[-1].confidence is None
+
+
+def test_states_are_waited_for_once_they_come_but_not_for_long(gathered, clock, status):
+    assembly, delivered = gathered
+    state = State(1, (5.0, 6.0), np.eye(2), (1.0, 0.0), np.eye(2))
+    assembly.add_image(6, IMAGE)
+    assembly.add_statuses(6, (status('lost'),))
+    # A tracker that never told one is not waited for.
+    assert delivered[-1].stamp == 6 and delivered[-1].states == {}
+    assembly.add_image(7, IMAGE)
+    assembly.add_state(7, state)
+    assembly.add_statuses(7, (status('lost'),))
+    assert delivered[-1].stamp == 7 and delivered[-1].states == {1: state}
+    assembly.add_image(8, IMAGE)
+    assembly.add_statuses(8, (status('lost'),))
+    assert delivered[-1].stamp == 7
+    assembly.add_state(8, state)
+    assert delivered[-1].stamp == 8
+    assembly.add_image(9, IMAGE)
+    assembly.add_statuses(9, (status('lost'),))
+    clock.now += 0.3
+    assembly.release()
+    assert delivered[-1].stamp == 9
+    # Where there is no target, there is none to wait for.
+    assembly.add_image(10, IMAGE)
+    assembly.add_statuses(10, (status('idle'),))
+    assert delivered[-1].stamp == 10
 
 
 def test_what_never_becomes_complete_does_not_pile_up(gathered):

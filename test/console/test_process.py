@@ -18,6 +18,7 @@ import os
 from pathlib import Path
 import re
 import signal
+import socket
 import subprocess
 import sys
 import urllib.request
@@ -87,8 +88,8 @@ def test_console_ends_on_a_signal_while_a_page_is_open(run, stop):
     address = program.address()
     assert '<canvas' in fetch(address)
     with connect(address.replace('http', 'ws') + 'socket', origin=address.rstrip('/'),
-                 proxy=None) as socket:
-        assert '/ended/image_raw' in socket.recv(PATIENCE)
+                 proxy=None) as page:
+        assert '/ended/image_raw' in page.recv(PATIENCE)
         assert program.end(stop) == 0
     assert 'Traceback' not in program.told
 
@@ -97,6 +98,10 @@ def test_console_ends_on_a_signal_while_a_page_is_open(run, stop):
     (['--ros-args', '-p', 'host:=0.0.0.0'], 1, 'LMSCO_CONSOLE_TOKEN'),
     (['--ros-args', '-p', 'port:=eighty'], 1, 'docs/console.md'),
     (['--ros-args', '-p', 'port:=100000'], 1, 'cannot listen'),
+    (['--ros-args', '-p', 'image_transport:=theora'], 1, 'raw or compressed'),
+    (['--ros-args', '-p', 'history_megabytes:=-1.0'], 1, '0 or more'),
+    (['--ros-args', '-p', 'history_megabytes:=.nan'], 1, '0 or more'),
+    (['--ros-args', '-p', 'allowed_origins:=robot.example'], 1, 'https://robot.example'),
     (['--nonsense'], 2, '--help'), (['--version'], 0, 'lmsco_ros'), (['-h'], 0, '-p port:=')])
 def test_what_cannot_be_is_told_in_one_line(run, arguments, code, words):
     program = run([*CONSOLE, *arguments], LMSCO_CONSOLE_TOKEN='')
@@ -104,12 +109,49 @@ def test_what_cannot_be_is_told_in_one_line(run, arguments, code, words):
     assert words in program.told and 'Traceback' not in program.told
 
 
+@pytest.mark.parametrize('name, words', [
+    ('redonly', 'did you mean read_only'), ('qqq', 'docs/console.md lists all')])
+def test_parameter_that_is_not_heard_is_warned_of(run, name, words):
+    program = run([*CONSOLE, '--ros-args', '-p', 'port:=0', '-p', f'{name}:=true'])
+    program.address()
+    assert f'{name} is unknown' in program.told and words in program.told
+
+
+def test_page_for_every_address_is_told_by_the_name_of_the_machine(run):
+    program = run([*CONSOLE, '--ros-args', '-p', 'port:=0', '-p', 'host:=0.0.0.0'],
+                  LMSCO_CONSOLE_TOKEN='a long enough token')
+    assert f'//{socket.gethostname()}:' in program.address()
+
+
+def test_page_can_record_where_the_command_line_says(run, tmp_path):
+    folder = tmp_path / "odd: it's"
+    program = run([*LMSCO, '--port', '0', '--namespace', '/kept', '--record-folder', str(folder)])
+    address = program.address()
+    with connect(address.replace('http', 'ws') + 'socket', origin=address.rstrip('/'),
+                 proxy=None) as page:
+        assert '"can_record":true' in page.recv(PATIENCE)
+        page.send('{"type": "record", "on": true}')
+        assert str(folder) in page.recv(PATIENCE)
+        # What is under way is finished with the program.
+        assert program.end(signal.SIGINT) == 130
+    assert 'messages were recorded' in program.told and 'Traceback' not in program.told
+    (bag,) = folder.iterdir()
+    with AnyReader([bag]) as reader:
+        assert list(reader.messages()) == []
+
+
+def test_compressed_images_are_taken_when_asked_for(run):
+    program = run([*LMSCO, '--port', '0', '--namespace', '/small', '--compressed'])
+    program.address()
+    assert 'images on /small/image_raw/compressed' in program.process.stdout.readline()
+
+
 def test_command_line_offers_the_same_page(run):
     program = run([*LMSCO, '--port', '0', '--namespace', '/same', '--read-only'])
     address = program.address()
     with connect(address.replace('http', 'ws') + 'socket', origin=address.rstrip('/'),
-                 proxy=None) as socket:
-        hello = socket.recv(PATIENCE)
+                 proxy=None) as page:
+        hello = page.recv(PATIENCE)
     assert '/same/image_raw' in hello and '"read_only":true' in hello
     assert program.end(signal.SIGINT) == 130 and 'Traceback' not in program.told
 
@@ -122,14 +164,14 @@ def test_recording_is_marked_and_its_bag_is_written_at_the_end(run, tmp_path):
                    str(tmp_path / 'marks.txt'), '--bag', str(tmp_path / 'boxes')])
     address = program.address()
     with connect(address.replace('http', 'ws') + 'socket', origin=address.rstrip('/'),
-                 proxy=None) as socket:
-        socket.recv(PATIENCE)
+                 proxy=None) as page:
+        page.recv(PATIENCE)
         for number, x in ((1, 10), (3, 14)):
-            socket.send(f'{{"type": "step", "number": {number}, "by": 0}}')
-            stamp = re.search(rb'"stamp":"(\d+)"', socket.recv(PATIENCE))[1].decode()
-            socket.send(f'{{"type": "start", "stamp": "{stamp}", "box": [{x}, 5, 8, 6]}}')
-        socket.send('{"type": "reset"}')
-        socket.recv(PATIENCE)
+            page.send(f'{{"type": "step", "number": {number}, "by": 0}}')
+            stamp = re.search(rb'"stamp":"(\d+)"', page.recv(PATIENCE))[1].decode()
+            page.send(f'{{"type": "start", "stamp": "{stamp}", "box": [{x}, 5, 8, 6]}}')
+        page.send('{"type": "reset"}')
+        page.recv(PATIENCE)
     assert program.end(signal.SIGINT) == 130, program.told
     assert '2 marks are in' in program.told and 'Traceback' not in program.told
     assert (tmp_path / 'marks.txt').read_text().splitlines()[1] == '12.00,5.00,8.00,6.00'

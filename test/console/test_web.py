@@ -25,6 +25,7 @@ from starlette.websockets import WebSocketDisconnect
 from lmsco_ros.console import connection, frames
 from lmsco_ros.console.access import Access
 from lmsco_ros.console.web import make_app
+from msg_adapters.state import State
 
 TOKEN = 'a long enough token'
 OWN = {'origin': 'http://127.0.0.1:8080', 'host': '127.0.0.1:8080'}
@@ -56,6 +57,24 @@ def test_frame_and_its_state_come_in_one_message(page, feed, moment, read_frame)
     assert target['id'] == 1 and target['box'] == [5, 12, 8, 6] and target['score'] == 0.75
     assert state['health']['latency_ms'] == 12.5 and state['health']['dropped'] == 3
     assert cv2.imdecode(np.frombuffer(picture, np.uint8), cv2.IMREAD_UNCHANGED).shape == (48, 64)
+
+
+def test_expected_place_is_told_with_its_ellipse(page, feed, moment, read_frame):
+    """The covariance is that of half axes 3 and 1 px, turned by 30 degrees from x to y."""
+    turn = np.array([[np.cos(np.pi / 6), -np.sin(np.pi / 6)],
+                     [np.sin(np.pi / 6), np.cos(np.pi / 6)]])
+    covariance = turn @ np.diag([9.0, 1.0]) @ turn.T
+    states = {1: State(1, (20.0, 30.0), covariance, (30.0, -40.0), np.eye(2))}
+    feed.add(moment(5, 'lost', boxes={}, states=states))
+    page.send_json({'type': 'next', 'drawn': 0})
+    (target,) = read_frame(page.receive_bytes())[0]['targets']
+    expected = target['expected']
+    assert expected['center'] == [20, 30] and expected['speed'] == pytest.approx(50)
+    assert expected['axes'] == pytest.approx([6, 2])
+    assert expected['turn'] % np.pi == pytest.approx(np.pi / 6)
+    feed.add(moment(6))
+    page.send_json({'type': 'next', 'drawn': 5})
+    assert read_frame(page.receive_bytes())[0]['targets'][0]['expected'] is None
 
 
 def test_a_page_that_asks_late_gets_the_newest_frame(page, feed, moment, read_frame):

@@ -254,3 +254,8 @@ def test_header_is_taken_over():
     header = Header(frame_id='thermal')
     header.stamp.sec = 7
     assert compressed_from_image(np.zeros((2, 2), np.uint8), header=header).header == header
+
+
+def test_array_that_no_file_of_the_codec_holds_is_refused():
+    with pytest.raises(ImageMessageError, match='70000 x 2 pixels.*sensor_msgs/Image'):
+        compressed_from_image(np.zeros((2, 70000), np.uint8), codec='jpeg')

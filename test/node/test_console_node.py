@@ -53,8 +53,8 @@ def watched(running, console):
     graph = running.graph
     graph.spin_until(lambda: running.images.get_subscription_count() == 2)
     # The test itself listens to the status, too.
-    listeners = {'/lmsco_tracker/status': 2, '/lmsco_tracker/boxes': 1, '/init_box_stamped': 1,
-                 '/select': 1}
+    listeners = {'/lmsco_tracker/status': 2, '/lmsco_tracker/boxes': 1,
+                 '/lmsco_tracker/state': 1, '/init_box_stamped': 1, '/select': 1}
     for publisher in (*running.node.publishers, *running.console.publishers):
         graph.spin_until(lambda: publisher.get_subscription_count()
                          >= listeners.get(publisher.topic_name, 0))
@@ -126,6 +126,19 @@ def test_lost_and_found_are_shown(watched):
     assert kinds == ['accepted', 'lost', 'found']
 
 
+def test_states_are_shown_with_their_frame_also_while_lost(watched):
+    follow(watched)
+    watched.fake.states = [TrackState.TRACKING, TrackState.LOST]
+    for _ in range(2):
+        moment = shown(watched, watched.graph.image())
+        (state,) = moment.states.values()
+        # The fake expects the target two pixels to the right of its box and one below.
+        expected = watched.fake.results[1].predicted_box.center
+        assert state.track_id == 1 and state.velocity == (30, -15)
+        assert state.center == pytest.approx(expected)
+    assert moment.statuses[0].state == 'lost' and moment.boxes == {}
+
+
 def test_point_and_selection_are_published(graph, console):
     node = console()
     points, numbers = graph.listen(PointStamped, 'init_point'), graph.listen(UInt32, 'select')
@@ -188,18 +201,18 @@ def test_all_that_is_shown_is_recorded(running, console, tmp_path):
     graph.spin_until(lambda: answers)
     assert answers[0][0] and str(tmp_path) in answers[0][1]
     listeners = {'/lmsco_tracker/status': 3, '/lmsco_tracker/boxes': 2, '/image_raw': 3,
-                 '/lmsco_tracker/box': 2, '/init_box_stamped': 1}
+                 '/lmsco_tracker/box': 2, '/lmsco_tracker/state': 2, '/init_box_stamped': 1}
     for publisher in (*running.node.publishers, *graph.user.publishers,
                       *running.console.publishers):
         graph.spin_until(lambda: publisher.get_subscription_count()
                          >= listeners.get(publisher.topic_name, 0))
     seen = follow(running)
     shown(running, graph.image(9))
-    # Of each frame an image and a status, of the start one more, and two boxes of each kind.
-    graph.spin_until(lambda: running.console.desk.recorded() >= 9)
+    # Of each frame an image, a status, a box of each kind and a state, of the start a status more.
+    graph.spin_until(lambda: running.console.desk.recorded() >= 11)
     running.console.record(False, lambda done, text: answers.append((done, text)))
     graph.spin_until(lambda: len(answers) == 2)
-    assert answers[1] == (True, '9 messages were recorded')
+    assert answers[1] == (True, '11 messages were recorded')
     assert running.console.desk.recorded() is None
     (bag,) = (tmp_path / 'bags').iterdir()
     with AnyReader([bag]) as reader:
@@ -208,7 +221,7 @@ def test_all_that_is_shown_is_recorded(running, console, tmp_path):
                   for connection, _, data in reader.messages()
                   if connection.topic == '/image_raw']
     assert topics == {'/image_raw', *(f'/lmsco_tracker/{name}'
-                                      for name in ('status', 'box', 'boxes'))}
+                                      for name in ('status', 'box', 'boxes', 'state'))}
     stamps = [image.header.stamp.sec * 10 ** 9 + image.header.stamp.nanosec for image in images]
     assert stamps[0] == seen.stamp and len(stamps) == 2
 
@@ -235,6 +248,15 @@ def test_images_are_shown_without_a_tracker(graph, console):
     graph.spin_until(lambda: node._feed.after(0))
     assert node._feed.after(0).statuses == ()
     assert node.desk.images.silence > 0 and node.desk.answers.silence is None
+
+
+def test_log_tells_when_images_and_answers_begin_once(watched, monkeypatch):
+    told = []
+    monkeypatch.setattr(type(watched.console.get_logger()), 'info',
+                        lambda self, text, **more: told.append(text))
+    for value in (1, 2):
+        shown(watched, watched.graph.image(value))
+    assert told == ['images come, 64 x 48 pixels', 'lmsco_tracker answers']
 
 
 def test_compressed_images_are_shown(graph, console):

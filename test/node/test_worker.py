@@ -17,6 +17,7 @@
 
 from dataclasses import replace
 from pathlib import Path
+import re
 import subprocess
 import sys
 import threading
@@ -331,6 +332,18 @@ def test_request_for_a_missed_frame_is_refused(bench):
     b.wait(3)
     assert sorted(o.phase.value for o in b.outcomes) == ['idle', 'idle', 'refused']
     assert 'no frame with the stamp 2.0' in next(o.error for o in b.outcomes if o.error)
+
+
+def test_request_for_a_frame_that_is_gone_tells_how_much_too_old_it_is(bench):
+    b = bench()
+    b.frame(8)
+    b.wait(1)
+    b.worker.initialize(BOX, 5 * SECOND)
+    b.frame(9)
+    b.wait(3)
+    reason = next(o.error for o in b.outcomes if o.error)
+    assert re.search(r'stamp 5\.0+ is kept: it is \d+\.\d s too old', reason)
+    assert 'frame_history_seconds' in reason
 
 
 def test_request_for_a_frame_that_never_comes_expires(bench):

@@ -198,8 +198,8 @@ def test_wheel_holds_what_ros_looks_up(wheel):
         'share/lmsco_ros/package.xml',
         'share/lmsco_ros/config/fastdds_large_images.xml',
         'share/lmsco_ros/config/tracker.yaml',
-        *(f'share/lmsco_ros/config/cameras/{profile.name}'
-          for profile in (REPOSITORY / 'config' / 'cameras').iterdir()),
+        *(f'share/lmsco_ros/config/{folder}/{file.name}' for folder in ('cameras', 'viewers')
+          for file in (REPOSITORY / 'config' / folder).iterdir()),
         'share/lmsco_ros/launch/console.launch.py',
         'share/lmsco_ros/launch/tracker.launch.py',
     } <= shared

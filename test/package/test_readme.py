@@ -84,8 +84,10 @@ def offered_names(query, node, expected):
 def test_topic_table_is_the_interface_of_the_node(node, direction):
     """Every documented topic is offered with its type, and none is left out."""
     documented = documented_names(node, [row for row in table('Topics') if row[1] == direction])
-    if importlib.util.find_spec('vision_msgs') is None:
-        for name in ('~/detections', 'init_detections'):
+    optional = {'vision_msgs': ('~/detections', 'init_detections'),
+                'foxglove_msgs': ('~/annotations',)}
+    for package in (name for name in optional if importlib.util.find_spec(name) is None):
+        for name in optional[package]:
             documented.pop(node.resolve_topic_name(name), None)
     query = (node.get_subscriber_names_and_types_by_node if direction == 'in'
              else node.get_publisher_names_and_types_by_node)

@@ -50,9 +50,9 @@ def policy():
     return ElementTree.parse(POLICY).getroot()
 
 
-def granted(policy, group, rule):
-    """Return the full names that the only profile of the policy allows."""
-    profile, = policy.iter('profile')
+def granted(policy, node, group, rule):
+    """Return the full names that the policy allows to a node."""
+    profile = policy.find(f".//profile[@node='{node}']")
     own = f'/{profile.get("node")}'
     names = [entry.text for element in profile.iter(group) if element.get(rule) == 'ALLOW'
              for entry in element]
@@ -69,30 +69,50 @@ def test_policy_is_written_as_sros2_reads_it(policy):
             assert attributes[name] is None or value in attributes[name]
         if element.tag in ('topics', 'services'):
             assert len(element.attrib) == 1 and len(element)
-    profile, = policy.iter('profile')
-    assert (profile.get('ns'), profile.get('node')) == ('/', 'lmsco_tracker')
+    profiles = [(profile.get('ns'), profile.get('node')) for profile in policy.iter('profile')]
+    assert profiles == [('/', 'lmsco_tracker'), ('/', 'lmsco_console'), ('/', 'lmsco_recorder')]
+    assert [context.get('path') for context in policy.iter('context')] == [
+        f'/{node}' for _, node in profiles]
 
 
-@pytest.fixture(scope='module')
-def interface():
-    """Return what the graph tells of the node, over all ways to configure it."""
+def _tracker(transport, **kwargs):
+    from lmsco_ros.node.tracker_node import TrackerNode
+    return TrackerNode(f'{transport}_under_policy', **kwargs)
+
+
+def _console(transport, **kwargs):
+    """Make a console that does all that it ever does at once."""
+    from lmsco_ros.console.console_node import ConsoleNode
+    node = ConsoleNode(f'{transport}_console_under_policy', **kwargs)
+    node.want_map('somebody', True)
+    node.record(True, lambda done, text: None)
+    node._tick()
+    return node
+
+
+NODES = {'lmsco_tracker': _tracker, 'lmsco_console': _console}
+
+
+@pytest.fixture(scope='module', params=NODES)
+def interface(request, tmp_path_factory):
+    """Return the name of a node and what the graph tells of it, over all ways to configure it."""
     rclpy = pytest.importorskip('rclpy', reason='needs ROS 2')
     from rclpy.parameter import Parameter
 
-    from lmsco_ros.node.tracker_node import TrackerNode
     found = {'publish': set(), 'subscribe': set(), 'reply': set(), 'request': set()}
     for transport in ('raw', 'compressed'):
         context = rclpy.Context()
         rclpy.init(context=context)
         # A name of its own: the graph may still know of another that is called the same.
-        name = f'{transport}_under_policy'
-        node = TrackerNode(name, context=context, parameter_overrides=[
-            Parameter('image_transport', value=transport), Parameter('use_sim_time', value=True)])
+        node = NODES[request.param](transport, context=context, parameter_overrides=[
+            Parameter('image_transport', value=transport), Parameter('use_sim_time', value=True),
+            Parameter('record_folder', value=str(tmp_path_factory.mktemp('bags')))])
         for rule, names in _told(node).items():
-            found[rule] |= {full.replace(f'/{name}', '/lmsco_tracker') for full in names}
+            found[rule] |= {full.replace(f'/{node.get_name()}', f'/{request.param}')
+                            for full in names}
         node.destroy_node()
         rclpy.shutdown(context=context)
-    return found
+    return request.param, found
 
 
 def _told(node):
@@ -103,7 +123,8 @@ def _told(node):
                'request': node.get_client_names_and_types_by_node}
     known = {'publish': {entity.topic_name for entity in node.publishers},
              'subscribe': {entity.topic_name for entity in node.subscriptions},
-             'reply': {node.resolve_service_name(entity.srv_name) for entity in node.services}}
+             'reply': {node.resolve_service_name(entity.srv_name) for entity in node.services},
+             'request': {node.resolve_service_name(entity.srv_name) for entity in node.clients}}
     deadline = time.monotonic() + PATIENCE_SECONDS
     while True:
         told = {rule: {name for name, _ in query(node.get_name(), node.get_namespace())}
@@ -114,16 +135,28 @@ def _told(node):
         time.sleep(0.05)
 
 
-def test_policy_allows_exactly_what_the_node_has(policy, interface):
+def test_policy_allows_exactly_what_the_nodes_have(policy, interface):
+    from msg_adapters.annotations import annotations_available
     from msg_adapters.boxes import detections_available
-    publish, subscribe = (granted(policy, 'topics', way) for way in ('publish', 'subscribe'))
+    node, found = interface
+    publish, subscribe = (granted(policy, node, 'topics', way) for way in ('publish', 'subscribe'))
     if not detections_available():
-        publish.remove('/lmsco_tracker/detections')
-        subscribe.remove('/init_detections')
-    assert publish == interface['publish']
-    assert subscribe == interface['subscribe']
-    assert granted(policy, 'services', 'reply') == interface['reply']
-    assert granted(policy, 'services', 'request') == interface['request'] == set()
+        publish.discard('/lmsco_tracker/detections')
+        subscribe.discard('/init_detections')
+    if not annotations_available():
+        publish.discard('/lmsco_tracker/annotations')
+    assert publish == found['publish']
+    assert subscribe == found['subscribe']
+    assert granted(policy, node, 'services', 'reply') == found['reply']
+    assert granted(policy, node, 'services', 'request') == found['request']
+
+
+def test_recorder_may_hear_what_it_records(policy):
+    pytest.importorskip('rclpy', reason='needs ROS 2')
+    from lmsco_ros.replay.live_recording import LivePlan, NODE_NAME
+    heard = {f'/{topic}' for compressed in (False, True)
+             for topic in LivePlan(REPOSITORY, compressed=compressed).topics}
+    assert granted(policy, NODE_NAME, 'topics', 'subscribe') == heard
 
 
 def _names(tree):

@@ -1,5 +1,6 @@
 // The page: puts together the link, the stage, the strip, the history and the controls.
 
+import { Answer } from './answer.js';
 import { History } from './history.js';
 import { Link } from './link.js';
 import { Stage } from './stage.js';
@@ -7,28 +8,34 @@ import { Strip } from './strip.js';
 import { beep } from './sound.js';
 import { show } from './readings.js';
 
-const SAY_MS = 5000;
 const element = name => document.getElementById(name);
 const page = { paused: false, enabled: true, readOnly: false, recording: false, state: null, wasLost: false, stepping: false };
 
 const strip = new Strip(element('strip'));
 const history = new History(element('history'));
+const answer = new Answer(element('answer'), () => page.paused && step(0));
 const stage = new Stage(element('stage'), {
   drag: (box, seen) => start(box, seen),
-  click: (x, y, seen) => page.recording || command({ type: 'point', stamp: seen.stamp, x, y }),
+  click: (x, y, seen) => page.recording || wish({ type: 'point', stamp: seen.stamp, x, y }),
   pick: id => page.recording || command({ type: 'select', id }),
 });
 const link = new Link({ up: isUp, frame: takeFrame, message: takeMessage });
 
 function command(message) {
   if (page.readOnly) return;
-  say('');
+  answer.say('');
   link.send(message);
+}
+
+/** Ask for a start, which the tracker accepts or refuses when it gets to it. */
+function wish(message) {
+  command(message);
+  if (!page.readOnly && !page.recording) answer.expect();
 }
 
 /** Start in the frame that was seen; in a recording, mark it and look at the mark. */
 function start(box, seen) {
-  command({ type: 'start', stamp: seen.stamp, box });
+  wish({ type: 'start', stamp: seen.stamp, box });
   step(0);
 }
 
@@ -39,13 +46,6 @@ function mark(type) {
   step(0);
 }
 
-function say(text, refused = false) {
-  clearTimeout(page.saying);
-  if (!refused) page.saying = setTimeout(say, SAY_MS, '');
-  element('answer').textContent = text;
-  element('answer').classList.toggle('refused', refused);
-}
-
 function isUp(up) {
   element('link').textContent = up ? 'connected' : 'not connected';
   element('link').dataset.up = up;
@@ -53,6 +53,7 @@ function isUp(up) {
     page.stepping = false;
     page.later = null;
     history.clear();
+    answer.begin();
     look();
     if (!page.paused) ask();
   } else {
@@ -64,8 +65,13 @@ function ask() {
   link.send({ type: 'next', drawn: page.state ? page.state.number : 0 });
 }
 
+function note(events) {
+  history.add(events);
+  answer.hear(events);
+}
+
 async function takeFrame(state, picture) {
-  history.add(state.events);
+  note(state.events);
   try {
     const image = await createImageBitmap(picture);
     // A view that stands still moves by steps alone.
@@ -99,11 +105,11 @@ function takeMessage(message) {
     choices(message.palettes);
     strip.load(message.strip);
   } else if (message.type === 'answer') {
-    say(message.text, !message.done);
+    answer.told(message.done, message.text);
     // A step that cannot be made has no frame that would end it.
     if (!message.done) stepped();
   } else if (message.type === 'silence') {
-    history.add(message.events);
+    note(message.events);
     if (page.recording) {
       // It is at its end.
       if (!page.paused) pause();
@@ -149,10 +155,6 @@ function tell(state) {
   const count = state.health.recorded;
   element('record').textContent = count === null ? 'Record' : `Stop recording (${count} messages)`;
   element('record').setAttribute('aria-pressed', String(count !== null));
-  for (const event of state.events) {
-    if (event.kind === 'refused') say(event.text, true);
-    if (event.kind === 'accepted') say(`target ${event.track_id} is followed`);
-  }
   const lost = state.targets.filter(each => each.state === 'lost').map(each => each.id);
   const silence = state.health.tracker_silence;
   if (lost.length) warn(`Target ${lost.join(', ')} lost. It is searched for.`);

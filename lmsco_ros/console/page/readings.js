@@ -24,16 +24,25 @@ export function show(state, pick) {
   const box = target && target.box;
   write('score', target ? fixed(target.score, 2) : NONE);
   write('size', box ? `${box[2].toFixed(0)} × ${box[3].toFixed(0)} px` : NONE);
-  write('position', box ? `${(box[0] + box[2] / 2).toFixed(0)}, ${(box[1] + box[3] / 2).toFixed(0)} px` : NONE);
+  write('position', position(box, target && target.expected));
+  write('speed', fixed(target && target.expected && target.expected.speed, 0, ' px/s'));
   heat(target);
   health(state.health);
   list(state, pick);
 }
 
+/** Where a target is, or about where it is expected while it is not seen. */
+function position(box, expected) {
+  if (box) return `${(box[0] + box[2] / 2).toFixed(0)}, ${(box[1] + box[3] / 2).toFixed(0)} px`;
+  if (!expected) return NONE;
+  const [x, y] = expected.center;
+  return `about ${x.toFixed(0)}, ${y.toFixed(0)} ± ${expected.axes[0].toFixed(0)} px`;
+}
+
 function heat(target) {
   const celsius = target && target.celsius;
   const reading = celsius || (target && target.counts);
-  write('heat-name', celsius ? 'Temperature' : 'Value');
+  if (reading) write('heat-name', celsius ? 'Temperature' : 'Value');
   const digits = celsius ? 1 : 0;
   write('heat', reading ? `${reading.mean.toFixed(digits)}${celsius ? ' °C' : ''} (${
     reading.minimum.toFixed(digits)} to ${reading.maximum.toFixed(digits)})` : NONE);

@@ -69,6 +69,7 @@ export class Stage {
     pen.imageSmoothingEnabled = scale < 3;
     pen.drawImage(this.image, left, top, scale * this.state.width, scale * this.state.height);
     for (const target of this.state.targets) {
+      if (target.expected && target.state !== 'tracking') this.drawExpected(target, left, top, scale);
       if (target.box) this.drawTarget(target, left, top, scale);
     }
     if (this.start && this.end) this.drawDrag(left, top, scale);
@@ -91,12 +92,38 @@ export class Stage {
     this.label(`${target.id} ${target.state}${score}`, left + x, top + y, height);
   }
 
+  /** The ellipse in which a target is expected that is not seen well. */
+  drawExpected({ id, box, expected }, left, top, scale) {
+    const pen = this.context;
+    const [x, y] = [left + scale * expected.center[0], top + scale * expected.center[1]];
+    const [long, short] = expected.axes.map(axis => Math.max(3, scale * axis));
+    pen.save();
+    pen.beginPath();
+    pen.rect(left, top, scale * this.state.width, scale * this.state.height);
+    pen.clip();
+    pen.beginPath();
+    pen.ellipse(x, y, long, short, expected.turn, 0, 2 * Math.PI);
+    pen.moveTo(x - 8, y);
+    pen.lineTo(x + 8, y);
+    pen.moveTo(x, y - 8);
+    pen.lineTo(x, y + 8);
+    for (const [color, width] of [['rgba(0, 0, 0, .75)', 3.5], ['#fff', 1.5]]) {
+      pen.strokeStyle = color;
+      pen.lineWidth = width;
+      pen.setLineDash([2, 4]);
+      pen.stroke();
+    }
+    pen.restore();
+    if (!box) this.label(`${id} expected about here`, x, y, 0);
+  }
+
   label(text, x, y, height) {
     const pen = this.context;
     pen.font = '600 13px system-ui, "DejaVu Sans", sans-serif';
     const width = pen.measureText(text).width + 10;
     const left = Math.max(0, Math.min(x - 1, this.canvas.clientWidth - width));
-    const top = y >= 24 ? y - 23 : y + height + 4;
+    const beside = y >= 24 ? y - 23 : y + height + 4;
+    const top = Math.max(0, Math.min(beside, this.canvas.clientHeight - 19));
     pen.fillStyle = 'rgba(0, 0, 0, .78)';
     pen.fillRect(left, top, width, 19);
     pen.fillStyle = '#fff';
