@@ -536,8 +536,8 @@ def test_doubted_start_is_lost_by_its_score_until_it_stands_out(monkeypatch):
         assert [judge(monitor, nothing).state for _ in range(3)] == states
 
 
-def test_first_frame_has_to_show_a_little_more_than_a_later_one():
-    monitor = PresenceMonitor(replace(CONFIG, certain=0.5))
+def test_first_frame_has_to_show_a_little_more_than_a_later_one(monitor):
+    monitor.config = replace(CONFIG, certain=0.5)
     assert monitor.start(at_score(monitor, 0.59)).note
     assert not monitor.start(at_score(monitor, 0.61)).note
 
