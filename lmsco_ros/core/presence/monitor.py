@@ -39,6 +39,9 @@ _PROBATION = 5
 
 # Belief that is enough for a jump, and to find again what has hardly moved.
 _LIKELY = 0.5
+# Score of the first frame from which the target stands out there: all 88 of the train part do, and
+# two of as many pieces of empty ground.
+_STANDING_OUT = 0.6
 # Part of the score that is told where nothing stood out at the start: of the ground on which
 # trackers were started, few frames seemed to be surer.
 _DOUBTED = 0.5
@@ -97,7 +100,7 @@ class PresenceMonitor:
         until it does.
         """
         seen = self.assess(evidence)
-        stands_out = seen.score >= self.config.certain
+        stands_out = seen.score >= max(self.config.certain, _STANDING_OUT)
         self._state = TrackState.TRACKING if stands_out else TrackState.UNCERTAIN
         self._doubtful = not stands_out
         return Verdict(seen.score, self._state, believed=True, learns=stands_out,

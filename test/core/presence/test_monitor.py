@@ -536,6 +536,12 @@ def test_doubted_start_is_lost_by_its_score_until_it_stands_out(monkeypatch):
         assert [judge(monitor, nothing).state for _ in range(3)] == states
 
 
+def test_first_frame_has_to_show_a_little_more_than_a_later_one(monitor):
+    monitor.config = replace(CONFIG, certain=0.5)
+    assert monitor.start(at_score(monitor, 0.59)).note
+    assert not monitor.start(at_score(monitor, 0.61)).note
+
+
 def test_score_of_a_doubted_start_is_halved_until_it_convinces():
     monitor = PresenceMonitor(CONFIG)
     monitor.start(evidence(10.0, presence=-1.0, vagueness=0.4))
