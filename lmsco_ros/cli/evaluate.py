@@ -28,13 +28,14 @@ from lmsco_ros.cli.console import (
     warn)
 from lmsco_ros.cli.evaluate_options import (
     ChallengeOption, DatasetArgument, EngineName, EngineOption, EveryOption, FramesOption,
-    JobsOption, LengthOption, OutputOption, PartOption, Protocol, ProtocolOption, SchedulerOption,
-    SequencesOption, ShardOption, SplitOption, TrackerOption)
+    JobsOption, LengthOption, OutputOption, PartOption, Protocol, ProtocolOption, PublishedOption,
+    PublishedTable, SchedulerOption, SequencesOption, ShardOption, SplitOption, TrackerOption)
 from lmsco_ros.extras import require_extra
 
 if TYPE_CHECKING:
     from lmsco_ros.evaluation.datasets.parts import AnchorPlan
     from lmsco_ros.evaluation.jobs import Engine, Job, Outcome
+    from lmsco_ros.evaluation.published import PublishedFile
     from lmsco_ros.evaluation.runner import Evaluation
     from lmsco_ros.evaluation.session import Request, Selection
     from lmsco_ros.evaluation.trackers import TrackerSpec
@@ -52,6 +53,7 @@ def evaluate(
     jobs: JobsOption = None, engine: EngineOption = EngineName.LOCAL,
     scheduler: SchedulerOption = None, shard: ShardOption = None, split: SplitOption = None,
     part: PartOption = 'test', challenge: ChallengeOption = None,
+    published: PublishedOption = None,
 ) -> None:
     """Run trackers over a dataset and report accuracy, robustness and speed."""
     with plain_errors():
@@ -65,6 +67,7 @@ def evaluate(
             request = Request(dataset, sequences, frames, split, part,
                               challenge_names(challenge or []), _anchors(protocol, every, length),
                               Shard(*shard) if shard else None)
+            peers = _published(published or [], frames)
             trackers = _trackers(tracker or [])
             selection = select_sequences(request)
         evaluation = Evaluation(trackers, selection.sequences, protocol.value, output)
@@ -72,7 +75,7 @@ def evaluate(
             warn(f'{reason}; it is made again')
         with telling_what_is_kept(lambda: _kept(evaluation, output)):
             context = _run(evaluation, request, selection, start)
-            page = _finish(evaluation, selection, context, output)
+            page = _finish(evaluation, selection, peers, context, output)
         _tell_starts(output, protocol)
         say(f'report: {page}')
 
@@ -137,6 +140,16 @@ def _anchors(protocol: Protocol, every: int | None,
     return None
 
 
+def _published(tables: Sequence[PublishedTable], frames: int | None) -> list[PublishedFile]:
+    """Return the figures of others that stand beside those that are made here."""
+    from lmsco_ros.evaluation.published import read_published
+
+    if tables and frames is not None:
+        fail('published figures are of whole sequences; leave out --frames or --published',
+             MISUSED)
+    return [read_published(*table) for table in tables]
+
+
 def _run(evaluation: Evaluation, request: Request, selection: Selection,
          start: EngineStart) -> dict[str, object]:
     """Run what is to be run, and return the conditions of that for the run file."""
@@ -178,8 +191,8 @@ def _line(job: Job, outcome: Outcome) -> str:
     return f'{where} {rate:7.1f} frames/s{failures}{crash}'
 
 
-def _finish(evaluation: Evaluation, selection: Selection, context: dict[str, object],
-            output: Path) -> Path:
+def _finish(evaluation: Evaluation, selection: Selection, published: Sequence[PublishedFile],
+            context: dict[str, object], output: Path) -> Path:
     """Write the run file, and the report on all protocols that have been run into the folder."""
     from lmsco_ros.evaluation.errors import ResultError
     from lmsco_ros.evaluation.report.page import write_report
@@ -194,7 +207,7 @@ def _finish(evaluation: Evaluation, selection: Selection, context: dict[str, obj
         for complaint in complaints:
             warn(f'not in the report: {complaint}')
         return write_report(output, runs, {
-            item.full_name: item for item in (*selection.wholes, *selection.sequences)})
+            item.full_name: item for item in (*selection.wholes, *selection.sequences)}, published)
 
 
 def _kept(evaluation: Evaluation, output: Path) -> str:

@@ -56,6 +56,22 @@ def parse_shard(text: str) -> Share:
     return Share(int(number), int(count))
 
 
+class PublishedTable(NamedTuple):
+    """What a file of published figures holds, and the file."""
+
+    figure: str
+    path: Path
+
+
+def parse_published(text: str) -> PublishedTable:
+    """Return the parts of `FIGURE=FILE`, or tell what they look like."""
+    figure, equals, path = text.partition('=')
+    if not (figure and equals and path):
+        raise typer.BadParameter(f'{text!r} names no figure and file; give them as in '
+                                 'success_auc=auc.csv')
+    return PublishedTable(figure, Path(path).expanduser())
+
+
 DatasetArgument = Annotated[Path, typer.Argument(
     show_default=False,
     help='Folder of a VOT, OTB, PTB-TIR, LSOTB-TIR, LaSOT, GOT-10k, TrackingNet, Anti-UAV or '
@@ -99,6 +115,11 @@ ShardOption = Annotated[Share | None, typer.Option(
 SplitOption = Annotated[Path | None, typer.Option(
     exists=True, dir_okay=False, show_default=False,
     help='YAML file of a split of the dataset: names of sequences by part and group.')]
+PublishedOption = Annotated[list[PublishedTable] | None, typer.Option(
+    '--published', parser=parse_published, metavar='FIGURE=FILE', show_default=False,
+    help='Set figures that others published beside those of the one-pass run: success_auc, '
+         'precision_5, precision_20 or normalized_precision of each sequence; '
+         'docs/datasets.md shows the file. May be repeated.')]
 PartOption = Annotated[str, typer.Option(help='Part of the split that is evaluated.')]
 ChallengeOption = Annotated[list[str] | None, typer.Option(
     show_default='the sequences as they are',

@@ -22,7 +22,7 @@ from typing import Annotated
 import typer
 
 from lmsco_ros.cli.console import misuse, plain_errors, say
-from lmsco_ros.cli.evaluate_options import SplitOption
+from lmsco_ros.cli.evaluate_options import PublishedOption, SplitOption
 from lmsco_ros.extras import require_extra
 
 
@@ -39,10 +39,12 @@ def results(
     page: Annotated[Path, typer.Option(
         dir_okay=False, help='Markdown file to write.')] = Path('docs/results.md'),
     split: SplitOption = None,
+    published: PublishedOption = None,
 ) -> None:
     """Write the tables of evaluations as one Markdown page."""
     with plain_errors():
         require_extra('eval', '`lmsco results`')
+    from lmsco_ros.evaluation.published import read_published
     from lmsco_ros.evaluation.results_page import results_page
     from lmsco_ros.evaluation.split import load_split
     from lmsco_ros.evaluation.whole_file import write_whole
@@ -50,5 +52,6 @@ def results(
     with plain_errors():
         with misuse():
             known = load_split(split) if split else None
-        write_whole(page, results_page(folders, known).encode())
+            peers = [read_published(*table) for table in published or []]
+        write_whole(page, results_page(folders, known, peers).encode())
         say(f'results: {page}')

@@ -23,6 +23,8 @@ from lmsco_ros.evaluation.challenges import CHALLENGES
 from lmsco_ros.evaluation.errors import DatasetError
 from lmsco_ros.evaluation.execution import PROTOCOLS
 from lmsco_ros.evaluation.merging import merged_run
+from lmsco_ros.evaluation.published import (
+    published_note, PublishedFile, summarize_published)
 from lmsco_ros.evaluation.report.conditions import conditions, extent, problems
 from lmsco_ros.evaluation.report.formatting import spread_warning
 from lmsco_ros.evaluation.report.tables import (
@@ -107,7 +109,8 @@ and the state is not LOST. Boxes without any overlap before that are claims else
 """
 
 
-def results_page(folders: Sequence[Path], split: Split | None = None) -> str:
+def results_page(folders: Sequence[Path], split: Split | None = None,
+                 published: Sequence[PublishedFile] = ()) -> str:
     """
     Return the tables of evaluation folders as Markdown.
 
@@ -118,6 +121,8 @@ def results_page(folders: Sequence[Path], split: Split | None = None) -> str:
         table.
     split : Split, optional
         Tells of the dataset, and which groups have chapters of their own.
+    published : sequence of PublishedFile, optional
+        Figures of others that stand beside those of the one-pass run.
 
     Raises
     ------
@@ -134,7 +139,8 @@ def results_page(folders: Sequence[Path], split: Split | None = None) -> str:
     parts = [_INTRODUCTION, *([split.about] if split and split.about else [])]
     for title, groups, challenge in _scenes(next(iter(runs.values())), scenes):
         found = {name: run.only(groups, challenge) for name, run in runs.items()}
-        parts += _scene(title, {name: run for name, run in found.items() if run.sequences})
+        parts += _scene(title, {name: run for name, run in found.items() if run.sequences},
+                        published)
     parts += ['## Conditions\n', _conditions(runs)]
     return '\n'.join(parts)
 
@@ -157,16 +163,13 @@ def _scenes(run: EvaluationRun, scenes: Mapping[str, tuple[str, ...]],
     return found + [('All sequences', None, None)] if len(found) != 1 else found
 
 
-def _scene(title: str, runs: Mapping[str, EvaluationRun]) -> list[str]:
+def _scene(title: str, runs: Mapping[str, EvaluationRun],
+           published: Sequence[PublishedFile]) -> list[str]:
     main = next(iter(runs.values()))
     count = f'{extent(main)}. {spread_warning(len(main.wholes))}'.strip()
     parts = [f'## {title}\n', f'{count}\n']
     if 'ope' in runs:
-        summaries = summarize_one_pass(runs['ope'])
-        aucs = {item.tracker: item.aucs for item in summaries}
-        parts += ['### One pass\n', _ONE_PASS_NOTE, _markdown(one_pass_table(summaries)),
-                  _comparison(difference_rows(differences(aucs, True), 3), 'success AUC'),
-                  *_confidence(runs['ope'])]
+        parts += _one_pass(runs['ope'], published)
     if 'vot' in runs:
         supervised = summarize_supervised(runs['vot'])
         failures = {item.tracker: item.failures for item in supervised}
@@ -181,6 +184,17 @@ def _scene(title: str, runs: Mapping[str, EvaluationRun]) -> list[str]:
         parts += ['### Several starts\n', _ANCHORS_NOTE.format(low=low, high=high),
                   _markdown(anchor_table(starts)), _markdown(border_table(starts))]
     return parts
+
+
+def _one_pass(run: EvaluationRun, published: Sequence[PublishedFile]) -> list[str]:
+    others = summarize_published(run, published)
+    summaries = (*summarize_one_pass(run), *others)
+    aucs = {item.tracker: item.aucs for item in summaries}
+    note = published_note(published, others)
+    return ['### One pass\n', _ONE_PASS_NOTE, _markdown(one_pass_table(summaries)),
+            *([f'{note}\n'] if note else []),
+            _comparison(difference_rows(differences(aucs, True), 3), 'success AUC'),
+            *_confidence(run)]
 
 
 def _confidence(run: EvaluationRun) -> list[str]:

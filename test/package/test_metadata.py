@@ -40,7 +40,8 @@ WITHOUT_ROSDEP_KEY = {
     'array-api-compat', 'av', 'backports-zstd', 'distributed', 'lz4', 'protobuf', 'rosbags',
     'safetensors', 'starlette', 'threadpoolctl', 'torch', 'typer', 'uvicorn', 'websockets'}
 # The others are for evaluation against foreign code and stay out of the environment.
-INSTALLED_EXTRA = re.compile(r'extra == "(cli|eval|cluster|weights|console|ros|test|browser-test)"')
+INSTALLED_EXTRA = re.compile(
+    r'extra == "(cli|eval|cluster|weights|console|ros|test|browser-test)"')
 OF_EXTRA = re.compile(r'extra == "(cli|eval|cluster|weights|console)"')
 # Modules by distributions where the names differ.
 DISTRIBUTIONS = {
