@@ -28,12 +28,13 @@ from lmsco_ros.evaluation.published import (
 from lmsco_ros.evaluation.report.conditions import conditions, extent, problems
 from lmsco_ros.evaluation.report.formatting import spread_warning
 from lmsco_ros.evaluation.report.tables import (
-    absence_table, anchor_table, border_table, Cell, confidence_table, consistency_table,
-    difference_rows, DifferenceRow, one_pass_table, score_table, start_table, supervised_table,
-    Table)
+    absence_table, anchor_table, benchmark_table, border_table, Cell, confidence_table,
+    consistency_table, difference_rows, DifferenceRow, one_pass_table, score_table, start_table,
+    supervised_table, Table)
 from lmsco_ros.evaluation.run_file import EvaluationRun
 from lmsco_ros.evaluation.split import Split
 from lmsco_ros.evaluation.summaries.anchors import anchor_interval, summarize_anchors
+from lmsco_ros.evaluation.summaries.benchmarks import summarize_benchmarks
 from lmsco_ros.evaluation.summaries.confidence import summarize_confidence
 from lmsco_ros.evaluation.summaries.consistency import summarize_consistency
 from lmsco_ros.evaluation.summaries.differences import differences
@@ -58,6 +59,14 @@ thresholds; precision is the share of frames with a center error of at most 5 or
 pixels; normalized precision the mean share within 0 to 0.5 target sizes. Frames per
 second for one thread: of processor time, and on the clock with as many evaluations side
 by side as the conditions say.
+"""
+
+_BENCHMARK_NOTE = """\
+Measures of single benchmarks. AO is the mean overlap and SR the share of frames above an
+overlap of .5 and .75, over the frames of all sequences but the first ones, of what lies in
+the image (GOT-10k). Normalized precision at .2 is the share of frames with a center error
+of at most .2 target sizes (LaSOT). State accuracy is the mean of the overlap where the target
+is there, and of 1 where it is not and the tracker says so (Anti-UAV).
 """
 
 _SUPERVISED_NOTE = """\
@@ -194,6 +203,7 @@ def _one_pass(run: EvaluationRun, published: Sequence[PublishedFile]) -> list[st
     return ['### One pass\n', _ONE_PASS_NOTE, _markdown(one_pass_table(summaries)),
             *([f'{note}\n'] if note else []),
             _comparison(difference_rows(differences(aucs, True), 3), 'success AUC'),
+            _BENCHMARK_NOTE, _markdown(benchmark_table(summarize_benchmarks(run))),
             *_confidence(run)]
 
 

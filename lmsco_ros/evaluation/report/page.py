@@ -45,12 +45,13 @@ from lmsco_ros.evaluation.report.score_plots import score_plots
 from lmsco_ros.evaluation.report.style import looks, PUBLISHED_COLOR
 from lmsco_ros.evaluation.report.supervised_plots import expected_overlap_plot, supervised_plots
 from lmsco_ros.evaluation.report.tables import (
-    absence_table, anchor_table, border_table, Cell, confidence_table, consistency_table,
-    difference_rows, one_pass_table, reliability_table, Row, score_table, start_table,
-    supervised_table, Table)
+    absence_table, anchor_table, benchmark_table, border_table, Cell, confidence_table,
+    consistency_table, difference_rows, one_pass_table, reliability_table, Row, score_table,
+    start_table, supervised_table, Table)
 from lmsco_ros.evaluation.run_file import EvaluationRun
 from lmsco_ros.evaluation.summaries.anchors import anchor_interval, summarize_anchors
 from lmsco_ros.evaluation.summaries.attributes import attribute_names, summarize_attributes
+from lmsco_ros.evaluation.summaries.benchmarks import summarize_benchmarks
 from lmsco_ros.evaluation.summaries.confidence import confidence_parts, summarize_confidence
 from lmsco_ros.evaluation.summaries.consistency import consistency_parts, summarize_consistency
 from lmsco_ros.evaluation.summaries.differences import differences
@@ -136,6 +137,7 @@ def _one_pass(run: EvaluationRun, folder: Path,
     aucs = {item.tracker: item.aucs for item in (*summaries, *others)}
     return {
         'table': one_pass_table((*summaries, *others)),
+        'benchmarks': benchmark_table(summarize_benchmarks(run)),
         'plots': _save_plots(one_pass_plots(summaries), folder),
         'differences': difference_rows(differences(aucs, higher_is_better=True), 3),
         'attributes': _attributes(run, 'frames'),
