@@ -39,7 +39,7 @@ from lmsco_ros.evaluation.summaries.confidence import summarize_confidence
 from lmsco_ros.evaluation.summaries.consistency import summarize_consistency
 from lmsco_ros.evaluation.summaries.differences import differences
 from lmsco_ros.evaluation.summaries.one_pass import summarize_one_pass
-from lmsco_ros.evaluation.summaries.score import summarize_scores
+from lmsco_ros.evaluation.summaries.score import size_note, summarize_scores
 from lmsco_ros.evaluation.summaries.starts import summarize_starts
 from lmsco_ros.evaluation.summaries.supervised import eao_interval, summarize_supervised
 
@@ -50,7 +50,8 @@ Written by `lmsco results`; do not change by hand.
 
 Brackets hold 95 % bootstrap intervals over sequences; bold is the best of a column.
 
-EAO is taken over these sequences and compares within this page only.
+EAO is taken over these sequences; where they are not those of a VOT challenge, it compares
+within this page only.
 """
 
 _ONE_PASS_NOTE = """\
@@ -72,9 +73,9 @@ is there, and of 1 where it is not and the tracker says so (Anti-UAV).
 _SUPERVISED_NOTE = """\
 Started again five frames after each frame without overlap. Accuracy without the ten
 frames after each start, weighted by sequence length; reliability is the chance to
-survive 30 frames. At a jump the target moves by more than two of its sizes in one frame,
-mostly because the recording is cut: a search near the last place must fail there. EAO is
-the mean of the expected-overlap curve over sequence lengths of {low} to {high} frames, the
+survive 30 frames. At a jump the target moves by more than two of its sizes in one frame, as
+where a recording is cut: a search near the last place must fail there. EAO is the
+mean of the expected-overlap curve over sequence lengths of {low} to {high} frames, the
 curve followed to the longest sequence (MATLAB toolkit). The figure of the Python toolkit,
 whose curve ends at the tracker's own longest fragment and which so overrates trackers that
 fail early, stands beside it.
@@ -145,13 +146,21 @@ def results_page(folders: Sequence[Path], split: Split | None = None,
         raise DatasetError(f'no results in {", ".join(map(str, folders))}; '
                            'give output folders of `lmsco evaluate`')
     scenes = split.scenes if split else {}
-    parts = [_INTRODUCTION, *([split.about] if split and split.about else [])]
-    for title, groups, challenge in _scenes(next(iter(runs.values())), scenes):
+    main = next(iter(runs.values()))
+    parts = [_INTRODUCTION, *([split.about] if split and _tells_of(split, main) else [])]
+    for title, groups, challenge in _scenes(main, scenes):
         found = {name: run.only(groups, challenge) for name, run in runs.items()}
         parts += _scene(title, {name: run for name, run in found.items() if run.sequences},
                         published)
     parts += ['## Conditions\n', _conditions(runs)]
     return '\n'.join(parts)
+
+
+def _tells_of(split: Split, run: EvaluationRun) -> bool:
+    """Return whether what a split says of its dataset holds for all sequences of a run."""
+    known = frozenset().union(*split.parts.values())
+    return bool(split.about) and all(
+        whole.full_name.partition('+')[0] in known for whole in run.wholes)
 
 
 def _scenes(run: EvaluationRun, scenes: Mapping[str, tuple[str, ...]],
@@ -210,7 +219,9 @@ def _one_pass(run: EvaluationRun, published: Sequence[PublishedFile]) -> list[st
 def _confidence(run: EvaluationRun) -> list[str]:
     summaries = summarize_confidence(run)
     absence, starts = absence_table(summaries), start_table(summarize_starts(run))
-    parts = ['### Confidence\n', _CONFIDENCE_NOTE, _markdown(score_table(summarize_scores(run))),
+    note = size_note(run)
+    parts = ['### Confidence\n', _CONFIDENCE_NOTE, *([f'{note}\n'] if note else []),
+             _markdown(score_table(summarize_scores(run))),
              _markdown(confidence_table(summaries))]
     parts += [_ABSENCE_NOTE, _markdown(absence)] if absence is not None else []
     parts += [_START_NOTE, _markdown(starts)] if starts is not None else []

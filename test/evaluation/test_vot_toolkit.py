@@ -77,14 +77,15 @@ experiments:
 """
 
 
-def call(*command, folder=None):
-    """Run a command to its end and return its output; a failure shows it."""
+def call(*command, folder=None, may_fail=False):
+    """Run a command to its end and return its output; a failure shows it, unless it may."""
     # The toolkit looks for newer versions of itself on the network; no proxy listens there.
     offline = {'VOT_REGISTRY': '', 'http_proxy': 'http://127.0.0.1:9',
                'https_proxy': 'http://127.0.0.1:9'} if folder else {}
     done = subprocess.run(list(map(str, command)), cwd=folder, env={**os.environ, **offline},
                           stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
-    assert done.returncode == 0, f'{command} ended with {done.returncode}:\n{done.stdout}'
+    assert may_fail or done.returncode == 0, (
+        f'{command} ended with {done.returncode}:\n{done.stdout}')
     return done.stdout
 
 
@@ -205,7 +206,7 @@ def current(tmp_path, workspace):
         call(*vot, 'initialize', folder / 'stack.yaml', '--workspace', folder, '--nodownload',
              folder=folder.parent)
         return folder, call(*vot, 'evaluate', '--workspace', folder, tracker,
-                            folder=folder.parent)
+                            folder=folder.parent, may_fail=True)
     return run
 
 

@@ -39,8 +39,7 @@ from lmsco_ros.evaluation.report.conditions import conditions, extent, problems
 from lmsco_ros.evaluation.report.failures import worst_failures
 from lmsco_ros.evaluation.report.formatting import number, spread_warning
 from lmsco_ros.evaluation.report.one_pass_plots import one_pass_plots
-from lmsco_ros.evaluation.report.pictures import (
-    encode, failure_strip, thumbnail, TRUTH_COLOR)
+from lmsco_ros.evaluation.report.pictures import encode, failure_strip, thumbnail
 from lmsco_ros.evaluation.report.score_plots import score_plots
 from lmsco_ros.evaluation.report.style import looks, PUBLISHED_COLOR
 from lmsco_ros.evaluation.report.supervised_plots import expected_overlap_plot, supervised_plots
@@ -56,10 +55,11 @@ from lmsco_ros.evaluation.summaries.confidence import confidence_parts, summariz
 from lmsco_ros.evaluation.summaries.consistency import consistency_parts, summarize_consistency
 from lmsco_ros.evaluation.summaries.differences import differences
 from lmsco_ros.evaluation.summaries.one_pass import OnePassSummary, summarize_one_pass
-from lmsco_ros.evaluation.summaries.score import summarize_scores
+from lmsco_ros.evaluation.summaries.score import size_note, summarize_scores
 from lmsco_ros.evaluation.summaries.starts import summarize_starts
 from lmsco_ros.evaluation.summaries.supervised import eao_interval, summarize_supervised
 from lmsco_ros.evaluation.whole_file import write_whole
+from lmsco_ros.media.colors import TRUTH_COLOR
 
 _TITLE = 'Thermal tracking evaluation'
 
@@ -154,7 +154,8 @@ def _confidence(run: EvaluationRun, challenge: str) -> dict[str, Any]:
     title = f'{challenge}: {CHALLENGES[challenge].description}' if challenge else ''
     tables = (score_table(summarize_scores(run)), confidence_table(summaries),
               absence_table(summaries), start_table(summarize_starts(run)))
-    return {'title': title, 'tables': [table for table in tables if table is not None]}
+    return {'title': title, 'note': size_note(run),
+            'tables': [table for table in tables if table is not None]}
 
 
 def _consistency(run: EvaluationRun) -> list[dict[str, Any]]:
