@@ -67,7 +67,9 @@ Measures of single benchmarks. AO is the mean overlap and SR the share of frames
 overlap of .5 and .75, over the frames of all sequences but the first ones, of what lies in
 the image (GOT-10k). Normalized precision at .2 is the share of frames with a center error
 of at most .2 target sizes (LaSOT). State accuracy is the mean of the overlap where the target
-is there, and of 1 where it is not and the tracker says so (Anti-UAV).
+is there, and of 1 where it is not and the tracker says so (Anti-UAV). MSR and MPR, where there
+are two channels, are success AUC and precision by the boxes of that one that the tracker is
+nearer to (RGBT234).
 """
 
 _SUPERVISED_NOTE = """\

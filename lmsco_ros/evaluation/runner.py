@@ -132,4 +132,5 @@ class Evaluation:
             return
         self._infos[sequence.full_name] = SequenceInfo(
             sequence.name, sequence.group, (width, height),
-            sequence.ground_truth, sequence.attributes, sequence.challenge, sequence.origin)
+            sequence.ground_truth, sequence.attributes, sequence.challenge, sequence.origin,
+            None if sequence.challenge or sequence.origin else sequence.other_truth)

@@ -17,8 +17,10 @@
 import numpy as np
 import pytest
 
+from lmsco_ros.evaluation.report.tables import benchmark_table
 from lmsco_ros.evaluation.run_file import EvaluationRun, SequenceInfo
-from lmsco_ros.evaluation.summaries.benchmarks import state_accuracy, summarize_benchmarks
+from lmsco_ros.evaluation.summaries.benchmarks import (
+    nearer_figures, state_accuracy, summarize_benchmarks)
 from lmsco_ros.evaluation.trace import Trace
 
 NAN = float('nan')
@@ -76,3 +78,28 @@ def test_state_accuracy_rewards_overlap_and_true_absence(truth, trace, expected)
     overlap = run.sequences[0].overlaps(trace, in_image=False)
     assert state_accuracy(overlap, trace) == pytest.approx(expected)
     assert summarize_benchmarks(run)[0].state_accuracy.value == pytest.approx(expected)
+
+
+def test_maximum_rates_take_the_nearer_channel():
+    truth, other = [BOX] * 4, [HALF, HALF, NOTHING, (60., 10., 10., 10.)]
+    info = SequenceInfo('two', 'set', (100, 100), np.array(truth), {},
+                        other_truth=np.array(other))
+    trace = answers(BOX, HALF, BOX, (40., 10., 10., 10.))
+    success, precision = nearer_figures(info, trace)
+    # Overlaps 1, 1, 1 and 0: twenty of 21 thresholds are below 1.
+    assert success == pytest.approx(3 / 4 * 20 / 21)
+    assert precision == pytest.approx(1)
+    alone, = summarize_benchmarks(run_of((truth, trace)))
+    assert np.isnan(alone.maximum_success.value)
+    again = SequenceInfo.from_json(info.to_json())
+    np.testing.assert_array_equal(again.other_truth, info.other_truth)
+
+
+def test_columns_of_two_channels_are_there_where_there_are_two():
+    truth = np.array([BOX] * 3)
+    run = run_of((truth, answers(BOX, BOX, BOX)))
+    assert 'MSR (RGBT234)' not in benchmark_table(summarize_benchmarks(run)).columns
+    infos = (SequenceInfo('two', 'set', (100, 100), truth, {}, other_truth=truth),)
+    both = EvaluationRun('ope', infos, run.traces)
+    assert benchmark_table(summarize_benchmarks(both)).columns[-2:] == (
+        'MSR (RGBT234)', 'MPR 20 px')

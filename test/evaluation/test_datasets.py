@@ -306,3 +306,15 @@ def test_one_truth_of_both_channels_comes_before_that_of_the_infrared_one(tmp_pa
     text(tmp_path / 'clip' / 'ir.txt', '0 0 10 10')
     text(tmp_path / 'clip' / 'groundtruth.txt', '5 5 10 10')
     assert only(tmp_path).ground_truth.tolist() == [[5, 5, 10, 10]]
+
+
+def test_boxes_of_the_visible_channel_stand_beside_those_of_the_infrared_one(tmp_path):
+    images(tmp_path / 'clip' / 'i', 2)
+    text(tmp_path / 'clip' / 'groundTruth_i.txt', '0 0 10 10', '15 25 5 5')
+    text(tmp_path / 'clip' / 'groundTruth_v.txt', '1 0 11 10', '6 5 16 25')
+    sequence = only(tmp_path)
+    assert sequence.ground_truth.tolist() == [[0, 0, 10, 10], [5, 5, 10, 20]]
+    assert sequence.other_truth.tolist() == [[1, 0, 10, 10], [6, 5, 10, 20]]
+    assert sequence.first(1).other_truth.tolist() == [[1, 0, 10, 10]]
+    text(tmp_path / 'clip' / 'groundTruth_v.txt', '1 0 11 10')
+    assert '2 frames but 1 rows' in reason(tmp_path)

@@ -107,13 +107,14 @@ def read_rgbt(folder: Path) -> tuple[Plan, ...]:
     Read the infrared channel of RGBT234, LasHeR, VTUAV and GTOT: a label file for each channel.
 
     `infrared.txt` and `ir.txt` hold x, y, width, height; `groundTruth_i.txt` holds two opposite
-    corners. Coordinates are used as they are.
+    corners. Coordinates are used as they are. The boxes of the visible channel are kept beside.
     """
-    for name, (images, truth) in _RGBT.items():
-        labels = folder / name
+    for name, (images, truth, other) in _RGBT.items():
+        labels, others = folder / name, folder / other
         if labels.is_file():
             frames = partial(_image_folder, folder, images)
-            return (_plan(folder, folder.name, frames, partial(truth, labels)),)
+            visible = partial(truth, others) if others.is_file() else None
+            return (_plan(folder, folder.name, frames, partial(truth, labels), visible),)
     return ()
 
 
@@ -153,13 +154,13 @@ READERS: tuple[Reader, ...] = (
 
 
 def _plan(folder: Path, name: str, frames: Callable[[], FrameSource | None],
-          truth: Truth) -> Plan:
+          truth: Truth, other: Truth | None = None) -> Plan:
     group = folder.parent.name
-    return Plan(group, name, partial(_sequence, group, name, folder, frames, truth))
+    return Plan(group, name, partial(_sequence, group, name, folder, frames, truth, other))
 
 
 def _sequence(group: str, name: str, folder: Path, frames: Callable[[], FrameSource | None],
-              truth: Truth) -> TrackingSequence:
+              truth: Truth, other: Truth | None = None) -> TrackingSequence:
     """
     Return a sequence.
 
@@ -173,20 +174,29 @@ def _sequence(group: str, name: str, folder: Path, frames: Callable[[], FrameSou
         Returns the frames, or None where there are none.
     truth : callable
         Returns the boxes for a number of frames.
+    other : callable, optional
+        Returns those of another channel.
 
     """
     images = frames()
     if images is None:
         raise SequenceError('ground truth without frames; expected images or a video beside it '
                             '(docs/datasets.md)')
-    boxes = truth(len(images))
-    if len(images) != len(boxes):
-        first_only = ' (a test part that tells the first box only cannot be evaluated here)'
-        raise SequenceError(f'{len(images)} frames but {len(boxes)} rows of ground truth; both '
-                            f'must have the same number{first_only * (len(boxes) == 1)}')
+    boxes = _as_many(truth, len(images))
+    others = None if other is None else _as_many(other, len(images))
     boxes = np.where(unseen(folder, len(boxes))[:, None], np.nan, boxes)
     return TrackingSequence(name=name, group=group, frames=images, ground_truth=boxes,
-                            attributes=read_attributes(folder, len(boxes)))
+                            attributes=read_attributes(folder, len(boxes)), other_truth=others)
+
+
+def _as_many(truth: Truth, frames: int) -> Boxes:
+    """Return as many boxes as there are frames, or raise `SequenceError`."""
+    boxes = truth(frames)
+    if len(boxes) != frames:
+        first_only = ' (a test part that tells the first box only cannot be evaluated here)'
+        raise SequenceError(f'{frames} frames but {len(boxes)} rows of ground truth; both '
+                            f'must have the same number{first_only * (len(boxes) == 1)}')
+    return boxes
 
 
 def _tenth_boxes(labels: Path, frames: int) -> Boxes:
@@ -235,8 +245,9 @@ def _declared_channels(description: Path) -> tuple[str, ...]:
     return tuple(folders[name] for name in sorted(folders, key=lambda name: name != default))
 
 
-# Label file of the infrared channel, to the folders of its images and what its rows mean.
-_RGBT: Mapping[str, tuple[tuple[str, ...], Callable[[Path, int], Boxes]]] = {
-    'infrared.txt': (('infrared',), read_boxes),
-    'ir.txt': (('ir',), _tenth_boxes),
-    'groundTruth_i.txt': (('i',), _corner_boxes)}
+# Label file of the infrared channel, to the folders of its images, what its rows mean, and the
+# label file of the visible one.
+_RGBT: Mapping[str, tuple[tuple[str, ...], Callable[[Path, int], Boxes], str]] = {
+    'infrared.txt': (('infrared',), read_boxes, 'visible.txt'),
+    'ir.txt': (('ir',), _tenth_boxes, 'rgb.txt'),
+    'groundTruth_i.txt': (('i',), _corner_boxes, 'groundTruth_v.txt')}

@@ -128,6 +128,11 @@ def benchmark_table(summaries: Sequence[BenchmarkSummary]) -> Table:
         _Column('normalized precision at .2 (LaSOT)',
                 lambda item: item.normalized_precision_20),
         _Column('state accuracy (Anti-UAV)', lambda item: item.state_accuracy))
+    if any(math.isfinite(item.maximum_success.value) for item in summaries):
+        nearer: tuple[_Column[BenchmarkSummary], ...] = (
+            _Column('MSR (RGBT234)', lambda item: item.maximum_success),
+            _Column('MPR 20 px', lambda item: item.maximum_precision))
+        columns += nearer
     return _table(columns, summaries, None)
 
 

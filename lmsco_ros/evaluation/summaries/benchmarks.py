@@ -22,21 +22,26 @@ References
 .. [2] H. Fan et al., "LaSOT", CVPR 2019: precision at 0.2 of the target's size.
 .. [3] N. Jiang et al., "Anti-UAV", IEEE TMM 25, 2023: overlap where the target is there, and 1
    where it is rightly said not to be.
+.. [4] C. Li et al., "RGB-T object tracking: benchmark and baseline", Pattern Recognition 96, 2019:
+   success and precision by the boxes of that channel that a tracker is nearer to.
 
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+import math
 
 import numpy as np
 
-from lmsco_ros.evaluation.geometry import Array, is_absent
+from lmsco_ros.evaluation.geometry import Array, center_offsets, is_absent, overlaps
 from lmsco_ros.evaluation.protocols.bootstrap import Estimate, mean_estimate, ratio_estimate
-from lmsco_ros.evaluation.protocols.one_pass import NORMALIZED_THRESHOLDS, one_pass_figures
-from lmsco_ros.evaluation.run_file import EvaluationRun
+from lmsco_ros.evaluation.protocols.one_pass import (
+    NORMALIZED_THRESHOLDS, one_pass_figures, SUCCESS_THRESHOLDS)
+from lmsco_ros.evaluation.run_file import EvaluationRun, SequenceInfo
 from lmsco_ros.evaluation.trace import Trace
 
+_PRECISION_PIXELS = 20
 _LASOT_THRESHOLD = int(np.flatnonzero(np.isclose(NORMALIZED_THRESHOLDS, 0.2))[0])
 
 
@@ -56,6 +61,9 @@ class BenchmarkSummary:
         sequences.
     state_accuracy : Estimate
         Mean over sequences (Anti-UAV).
+    maximum_success, maximum_precision : Estimate
+        Success AUC, and the share of frames with a center error of at most 20 px, by the nearer
+        of two channels (RGBT234); over the sequences that have two, else NaN.
 
     """
 
@@ -65,6 +73,8 @@ class BenchmarkSummary:
     success_75: Estimate
     normalized_precision_20: Estimate
     state_accuracy: Estimate
+    maximum_success: Estimate
+    maximum_precision: Estimate
 
 
 def summarize_benchmarks(run: EvaluationRun) -> tuple[BenchmarkSummary, ...]:
@@ -88,6 +98,21 @@ def state_accuracy(overlap: Array, trace: Trace) -> float:
     return float(np.where(np.isnan(overlap), said, np.nan_to_num(overlap) * ~said).mean())
 
 
+def nearer_figures(sequence: SequenceInfo, trace: Trace) -> tuple[float, float]:
+    """Return success AUC and precision at 20 px by the nearer of two channels; NaN without."""
+    if sequence.other_truth is None:
+        return math.nan, math.nan
+    truths = sequence.ground_truth, sequence.other_truth
+    overlap = np.fmax(*(overlaps(truth, trace.boxes) for truth in truths))
+    errors = np.fmin(*(np.linalg.norm(center_offsets(truth, trace.boxes), axis=1)
+                       for truth in truths))
+    known = np.isfinite(overlap)
+    if not known.any():
+        return math.nan, math.nan
+    success = (overlap[known, None] > SUCCESS_THRESHOLDS).mean()
+    return float(success), float((errors[known] <= _PRECISION_PIXELS).mean())
+
+
 def _summarize(run: EvaluationRun, name: str) -> BenchmarkSummary:
     pairs = list(zip(run.sequences, run.traces[name], strict=True))
     followed = [sequence.overlaps(trace, in_image=True)[1:] for sequence, trace in pairs]
@@ -95,6 +120,7 @@ def _summarize(run: EvaluationRun, name: str) -> BenchmarkSummary:
     frames = np.array([float(len(overlap)) for overlap in known])
     normalized = [one_pass_figures(sequence.ground_truth, trace.boxes).normalized_precision
                   for sequence, trace in pairs]
+    nearer = np.array([nearer_figures(sequence, trace) for sequence, trace in pairs])
     return BenchmarkSummary(
         tracker=name,
         average_overlap=ratio_estimate(np.array([overlap.sum() for overlap in known]), frames),
@@ -103,10 +129,12 @@ def _summarize(run: EvaluationRun, name: str) -> BenchmarkSummary:
             np.array([curve[_LASOT_THRESHOLD] for curve in normalized])),
         state_accuracy=mean_estimate(np.array([
             state_accuracy(sequence.overlaps(trace, in_image=False), trace)
-            for sequence, trace in pairs])))
+            for sequence, trace in pairs])),
+        maximum_success=mean_estimate(nearer[:, 0]),
+        maximum_precision=mean_estimate(nearer[:, 1]))
 
 
-def _above(overlaps: list[Array], threshold: float, frames: Array) -> Estimate:
+def _above(found: list[Array], threshold: float, frames: Array) -> Estimate:
     """Return the share of frames with an overlap above a threshold."""
     return ratio_estimate(
-        np.array([float((overlap > threshold).sum()) for overlap in overlaps]), frames)
+        np.array([float((overlap > threshold).sum()) for overlap in found]), frames)
