@@ -21,7 +21,7 @@ import sys
 import pytest
 
 REPOSITORY = Path(__file__).resolve().parents[2]
-OF_EXTRAS = {'av', 'backports', 'google', 'jinja2', 'lz4', 'matplotlib', 'platformdirs',
+OF_EXTRAS = {'av', 'backports', 'dask', 'distributed', 'google', 'jinja2', 'lz4', 'matplotlib', 'platformdirs',
              'requests', 'rich', 'rosbags', 'scipy.io', 'starlette', 'typer', 'urllib3',
              'uvicorn', 'websockets'}
 HCS_AT_WORK = """
