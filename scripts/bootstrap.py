@@ -30,7 +30,7 @@ import sys
 SUPPORTED = ((3, 10), (3, 11), (3, 12))
 INTERPRETERS = ('python3', 'python3.12', 'python3.11', 'python3.10')
 STAMP = 'lmsco_ros.stamp'
-EXTRAS = 'cli,eval,weights,backbones,console'
+EXTRAS = 'cli,eval,cluster,weights,backbones,console'
 HOLD_BACK = '/usr/bin/env -S --block-signal=INT,TERM,HUP '
 LONGEST_FIRST_LINE = 250
 SOURCES = (

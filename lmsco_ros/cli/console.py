@@ -61,6 +61,17 @@ def plain_errors() -> Iterator[None]:
 
 
 @contextmanager
+def misuse() -> Iterator[None]:
+    """Leave as after misuse where a command asks an evaluation for what is not there."""
+    from lmsco_ros.evaluation.errors import RequestError, TrackerError
+
+    try:
+        yield
+    except (RequestError, TrackerError) as error:
+        fail(str(error), MISUSED)
+
+
+@contextmanager
 def _told_warnings() -> Iterator[None]:
     """Tell what is worth knowing about images and films like everything else."""
     from lmsco_ros.media.errors import MediaWarning

@@ -30,13 +30,15 @@ def build_app() -> typer.Typer:
     import typer
 
     from lmsco_ros.cli import (
-        config, demo, evaluate, make_bag, page, record, replay, track, version, weights)
+        config, demo, doctor, evaluate, make_bag, page, record, replay, results, track, version,
+        weights)
 
     app = typer.Typer(
         name='lmsco', no_args_is_help=True, pretty_exceptions_enable=False,
         context_settings={'help_option_names': ['-h', '--help']})
-    for command in (version, track, replay, make_bag, demo, page, record, evaluate, config,
-                    weights):
+    for command in (
+            version, track, replay, make_bag, demo, page, record, evaluate, results, config, weights,
+            doctor):
         command.register(app)
     return app
 

@@ -26,11 +26,12 @@ from typing import Any
 from lmsco_ros.evaluation import execution, geometry, trace
 from lmsco_ros.evaluation.datasets import frames
 from lmsco_ros.evaluation.errors import ResultError
+from lmsco_ros.evaluation.jobs import Job
 from lmsco_ros.evaluation.plain_values import damaged, MISFITS, read_object
 from lmsco_ros.evaluation.trace import Trace
+from lmsco_ros.evaluation.trackers import TrackerSpec
 from lmsco_ros.evaluation.trackers.code_version import sources_digest
 from lmsco_ros.evaluation.whole_file import write_json
-from lmsco_ros.evaluation.worker_pool import Job
 
 
 class RecordStore:
@@ -52,16 +53,12 @@ class RecordStore:
     def __init__(self, output: Path) -> None:
         """Note the folder; it is made with the first record."""
         self._output = output
-        self._identities: dict[str, str] = {}
-        modules = (execution, frames, geometry, trace)
-        self._code = sources_digest(tuple(Path(getfile(module)) for module in modules))
+        self._identities: dict[str, tuple[str, str]] = {}
 
     def path(self, job: Job) -> Path:
         """Return where the record of `job` belongs, relative to the output folder."""
-        if job.tracker.name not in self._identities:
-            self._identities[job.tracker.name] = job.tracker.identity
-        parts = (self._identities[job.tracker.name], job.sequence.fingerprint, job.protocol,
-                 self._code)
+        tracker, code = self._identity(job.tracker)
+        parts = (tracker, job.sequence.fingerprint, job.protocol, code)
         digest = hashlib.sha256('\0'.join(parts).encode()).hexdigest()[:12]
         name = file_name(f'{job.sequence.group}-{job.sequence.name}')
         return Path('records', job.protocol, file_name(job.tracker.name), f'{name}-{digest}.json')
@@ -93,6 +90,17 @@ class RecordStore:
         write_json(self._output / self.path(job), {
             'tracker': job.tracker.name, 'sequence': job.sequence.full_name,
             'protocol': job.protocol, **result.to_json()})
+
+    def _identity(self, tracker: TrackerSpec) -> tuple[str, str]:
+        if tracker.name not in self._identities:
+            self._identities[tracker.name] = identity(tracker)
+        return self._identities[tracker.name]
+
+
+def identity(tracker: TrackerSpec) -> tuple[str, str]:
+    """Return what changes with a tracker's settings and code, and with the code that drives it."""
+    modules = (execution, frames, geometry, trace)
+    return tracker.identity, sources_digest(tuple(Path(getfile(module)) for module in modules))
 
 
 def read_record(path: Path) -> Trace | None:

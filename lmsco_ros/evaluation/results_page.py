@@ -16,26 +16,30 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from lmsco_ros.evaluation.challenges import CHALLENGES
 from lmsco_ros.evaluation.errors import DatasetError
 from lmsco_ros.evaluation.execution import PROTOCOLS
+from lmsco_ros.evaluation.merging import merged_run
+from lmsco_ros.evaluation.published import (
+    published_note, PublishedFile, summarize_published)
 from lmsco_ros.evaluation.report.conditions import conditions, extent, problems
 from lmsco_ros.evaluation.report.formatting import spread_warning
 from lmsco_ros.evaluation.report.tables import (
-    absence_table, anchor_table, border_table, Cell, confidence_table, consistency_table,
-    difference_rows, DifferenceRow, one_pass_table, score_table, start_table, supervised_table,
-    Table)
-from lmsco_ros.evaluation.run_file import EvaluationRun, read_run
+    absence_table, anchor_table, benchmark_table, border_table, Cell, confidence_table,
+    consistency_table, difference_rows, DifferenceRow, one_pass_table, score_table, start_table,
+    supervised_table, Table)
+from lmsco_ros.evaluation.run_file import EvaluationRun
 from lmsco_ros.evaluation.split import Split
 from lmsco_ros.evaluation.summaries.anchors import anchor_interval, summarize_anchors
+from lmsco_ros.evaluation.summaries.benchmarks import summarize_benchmarks
 from lmsco_ros.evaluation.summaries.confidence import summarize_confidence
 from lmsco_ros.evaluation.summaries.consistency import summarize_consistency
 from lmsco_ros.evaluation.summaries.differences import differences
 from lmsco_ros.evaluation.summaries.one_pass import summarize_one_pass
-from lmsco_ros.evaluation.summaries.score import summarize_scores
+from lmsco_ros.evaluation.summaries.score import size_note, summarize_scores
 from lmsco_ros.evaluation.summaries.starts import summarize_starts
 from lmsco_ros.evaluation.summaries.supervised import eao_interval, summarize_supervised
 
@@ -46,7 +50,8 @@ Written by `lmsco results`; do not change by hand.
 
 Brackets hold 95 % bootstrap intervals over sequences; bold is the best of a column.
 
-EAO is taken over these sequences and compares within this page only.
+EAO is taken over these sequences; where they are not those of a VOT challenge, it compares
+within this page only.
 """
 
 _ONE_PASS_NOTE = """\
@@ -57,12 +62,22 @@ second for one thread: of processor time, and on the clock with as many evaluati
 by side as the conditions say.
 """
 
+_BENCHMARK_NOTE = """\
+Measures of single benchmarks. AO is the mean overlap and SR the share of frames above an
+overlap of .5 and .75, over the frames of all sequences but the first ones, of what lies in
+the image (GOT-10k). Normalized precision at .2 is the share of frames with a center error
+of at most .2 target sizes (LaSOT). State accuracy is the mean of the overlap where the target
+is there, and of 1 where it is not and the tracker says so (Anti-UAV). MSR and MPR, where there
+are two channels, are success AUC and precision by the boxes of that one that the tracker is
+nearer to (RGBT234).
+"""
+
 _SUPERVISED_NOTE = """\
 Started again five frames after each frame without overlap. Accuracy without the ten
 frames after each start, weighted by sequence length; reliability is the chance to
-survive 30 frames. At a jump the target moves by more than two of its sizes in one frame,
-mostly because the recording is cut: a search near the last place must fail there. EAO is
-the mean of the expected-overlap curve over sequence lengths of {low} to {high} frames, the
+survive 30 frames. At a jump the target moves by more than two of its sizes in one frame, as
+where a recording is cut: a search near the last place must fail there. EAO is the
+mean of the expected-overlap curve over sequence lengths of {low} to {high} frames, the
 curve followed to the longest sequence (MATLAB toolkit). The figure of the Python toolkit,
 whose curve ends at the tracker's own longest fragment and which so overrates trackers that
 fail early, stands beside it.
@@ -106,57 +121,48 @@ and the state is not LOST. Boxes without any overlap before that are claims else
 """
 
 
-def results_page(folders: Sequence[Path], split: Split | None = None) -> str:
+def results_page(folders: Sequence[Path], split: Split | None = None,
+                 published: Sequence[PublishedFile] = ()) -> str:
     """
     Return the tables of evaluation folders as Markdown.
 
     Parameters
     ----------
     folders : sequence of Path
-        Outputs of `lmsco evaluate`; trackers of several folders come into one table.
+        Outputs of `lmsco evaluate`; trackers and sequences of several folders come into one
+        table.
     split : Split, optional
         Tells of the dataset, and which groups have chapters of their own.
+    published : sequence of PublishedFile, optional
+        Figures of others that stand beside those of the one-pass run.
 
     Raises
     ------
     DatasetError
-        When a folder holds no run, or two runs are on different sequences.
+        When no folder holds a run, or a tracker lacks a sequence that another one has.
 
     """
     runs = {protocol: run for protocol in PROTOCOLS
-            if (run := _merged(folders, protocol)) is not None}
+            if (run := merged_run(folders, protocol)) is not None}
     if not runs:
         raise DatasetError(f'no results in {", ".join(map(str, folders))}; '
                            'give output folders of `lmsco evaluate`')
     scenes = split.scenes if split else {}
-    parts = [_INTRODUCTION, *([split.about] if split and split.about else [])]
-    for title, groups, challenge in _scenes(next(iter(runs.values())), scenes):
+    main = next(iter(runs.values()))
+    parts = [_INTRODUCTION, *([split.about] if split and _tells_of(split, main) else [])]
+    for title, groups, challenge in _scenes(main, scenes):
         found = {name: run.only(groups, challenge) for name, run in runs.items()}
-        parts += _scene(title, {name: run for name, run in found.items() if run.sequences})
+        parts += _scene(title, {name: run for name, run in found.items() if run.sequences},
+                        published)
     parts += ['## Conditions\n', _conditions(runs)]
     return '\n'.join(parts)
 
 
-def _merged(folders: Iterable[Path], protocol: str) -> EvaluationRun | None:
-    """Return one run with the trackers of all folders."""
-    merged: EvaluationRun | None = None
-    for folder in folders:
-        run = read_run(folder, protocol)
-        if run is None:
-            continue
-        if merged is None:
-            merged = run
-        elif _names(run) != _names(merged):
-            raise DatasetError(f'{folder} is on other sequences than the folders before it; '
-                               'tables need the same sequences for all trackers')
-        else:
-            merged = EvaluationRun(protocol, merged.sequences,
-                                   {**merged.traces, **run.traces}, merged.context)
-    return merged
-
-
-def _names(run: EvaluationRun) -> list[tuple[str, int]]:
-    return [(sequence.full_name, len(sequence.ground_truth)) for sequence in run.sequences]
+def _tells_of(split: Split, run: EvaluationRun) -> bool:
+    """Return whether what a split says of its dataset holds for all sequences of a run."""
+    known = frozenset().union(*split.parts.values())
+    return bool(split.about) and all(
+        whole.full_name.partition('+')[0] in known for whole in run.wholes)
 
 
 def _scenes(run: EvaluationRun, scenes: Mapping[str, tuple[str, ...]],
@@ -177,16 +183,13 @@ def _scenes(run: EvaluationRun, scenes: Mapping[str, tuple[str, ...]],
     return found + [('All sequences', None, None)] if len(found) != 1 else found
 
 
-def _scene(title: str, runs: Mapping[str, EvaluationRun]) -> list[str]:
+def _scene(title: str, runs: Mapping[str, EvaluationRun],
+           published: Sequence[PublishedFile]) -> list[str]:
     main = next(iter(runs.values()))
     count = f'{extent(main)}. {spread_warning(len(main.wholes))}'.strip()
     parts = [f'## {title}\n', f'{count}\n']
     if 'ope' in runs:
-        summaries = summarize_one_pass(runs['ope'])
-        aucs = {item.tracker: item.aucs for item in summaries}
-        parts += ['### One pass\n', _ONE_PASS_NOTE, _markdown(one_pass_table(summaries)),
-                  _comparison(difference_rows(differences(aucs, True), 3), 'success AUC'),
-                  *_confidence(runs['ope'])]
+        parts += _one_pass(runs['ope'], published)
     if 'vot' in runs:
         supervised = summarize_supervised(runs['vot'])
         failures = {item.tracker: item.failures for item in supervised}
@@ -203,10 +206,24 @@ def _scene(title: str, runs: Mapping[str, EvaluationRun]) -> list[str]:
     return parts
 
 
+def _one_pass(run: EvaluationRun, published: Sequence[PublishedFile]) -> list[str]:
+    others = summarize_published(run, published)
+    summaries = (*summarize_one_pass(run), *others)
+    aucs = {item.tracker: item.aucs for item in summaries}
+    note = published_note(published, others)
+    return ['### One pass\n', _ONE_PASS_NOTE, _markdown(one_pass_table(summaries)),
+            *([f'{note}\n'] if note else []),
+            _comparison(difference_rows(differences(aucs, True), 3), 'success AUC'),
+            _BENCHMARK_NOTE, _markdown(benchmark_table(summarize_benchmarks(run))),
+            *_confidence(run)]
+
+
 def _confidence(run: EvaluationRun) -> list[str]:
     summaries = summarize_confidence(run)
     absence, starts = absence_table(summaries), start_table(summarize_starts(run))
-    parts = ['### Confidence\n', _CONFIDENCE_NOTE, _markdown(score_table(summarize_scores(run))),
+    note = size_note(run)
+    parts = ['### Confidence\n', _CONFIDENCE_NOTE, *([f'{note}\n'] if note else []),
+             _markdown(score_table(summarize_scores(run))),
              _markdown(confidence_table(summaries))]
     parts += [_ABSENCE_NOTE, _markdown(absence)] if absence is not None else []
     parts += [_START_NOTE, _markdown(starts)] if starts is not None else []

@@ -62,6 +62,8 @@ class SequenceInfo:
         What the sequence was made harder with; empty for one as it was recorded.
     origin : Origin or None
         The whole sequence that this is a part of; None for one that is whole.
+    other_truth : ndarray, shape (n, 4), or None
+        Boxes of the visible channel, where the data has them.
 
     """
 
@@ -72,6 +74,7 @@ class SequenceInfo:
     attributes: Mapping[str, npt.NDArray[np.bool_]]
     challenge: str = ''
     origin: Origin | None = None
+    other_truth: npt.NDArray[np.float64] | None = None
 
     @property
     def full_name(self) -> str:
@@ -89,13 +92,13 @@ class SequenceInfo:
 
     def to_json(self) -> dict[str, Any]:
         """Return plain values; absent boxes become None."""
-        rows = [row.round(4).tolist() if np.isfinite(row).all() else None
-                for row in self.ground_truth]
         flags = {name: np.flatnonzero(values).tolist()
                  for name, values in self.attributes.items()}
         return {'name': self.name, 'group': self.group, 'size': list(self.size),
-                'ground_truth': rows, 'attributes': flags, 'challenge': self.challenge,
-                'origin': None if self.origin is None else asdict(self.origin)}
+                'ground_truth': _rows(self.ground_truth),
+                'attributes': flags, 'challenge': self.challenge,
+                'origin': None if self.origin is None else asdict(self.origin),
+                'other_truth': None if self.other_truth is None else _rows(self.other_truth)}
 
     @classmethod
     def from_json(cls, content: Mapping[str, Any]) -> SequenceInfo:
@@ -115,7 +118,7 @@ class SequenceInfo:
                       for name, indices in the_object(content['attributes']).items()}
         return cls(the_text(content['name']), the_text(content['group']), (width, height),
                    boxes, attributes, the_text(content.get('challenge', '')),
-                   _origin(content.get('origin')))
+                   _origin(content.get('origin')), _other_truth(content, len(boxes)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -260,6 +263,21 @@ def _origin(content: Any) -> Origin | None:
     if content is None:
         return None
     return Origin(the_text(the_object(content)['full_name']), whole_number(content['frames']))
+
+
+def _rows(boxes: npt.NDArray[np.float64]) -> list[list[float] | None]:
+    """Return boxes as plain values, None for absent ones."""
+    return [row.round(4).tolist() if np.isfinite(row).all() else None for row in boxes]
+
+
+def _other_truth(content: Mapping[str, Any], frames: int) -> npt.NDArray[np.float64] | None:
+    """Return the boxes of the visible channel, if a run file has them."""
+    if content.get('other_truth') is None:
+        return None
+    boxes = box_rows(content['other_truth'])
+    if len(boxes) != frames:
+        raise ValueError(f'{len(boxes)} boxes of the visible channel for {frames} frames')
+    return boxes
 
 
 def _record(path: Path) -> Trace:

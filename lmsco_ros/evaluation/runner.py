@@ -23,10 +23,10 @@ from typing import Any
 
 from lmsco_ros.evaluation.datasets import BrokenSequence, TrackingSequence
 from lmsco_ros.evaluation.errors import DatasetError, ResultError, SequenceError
+from lmsco_ros.evaluation.jobs import Engine, Job, LeftOut, Outcome
 from lmsco_ros.evaluation.record_store import RecordStore
 from lmsco_ros.evaluation.run_file import SequenceInfo, write_run
 from lmsco_ros.evaluation.trackers import TrackerSpec
-from lmsco_ros.evaluation.worker_pool import Job, Outcome, run_jobs, Unreadable
 
 
 class Evaluation:
@@ -85,11 +85,11 @@ class Evaluation:
             self.damaged.append(str(error))
             return False
 
-    def run(self, workers: int) -> Generator[tuple[Job, Outcome], None, None]:
-        """Run what is pending in `workers` processes and yield each job that is done."""
-        with closing(run_jobs(self.pending, workers)) as outcomes:
+    def run(self, engine: Engine) -> Generator[tuple[Job, Outcome], None, None]:
+        """Let `engine` run what is pending, and yield each job that is done."""
+        with closing(engine.run(self.pending)) as outcomes:
             for job, outcome in outcomes:
-                if isinstance(outcome, Unreadable):
+                if isinstance(outcome, LeftOut):
                     self._drop(job.sequence.full_name, outcome.reason)
                 else:
                     self._store.write(job, outcome)
@@ -132,4 +132,5 @@ class Evaluation:
             return
         self._infos[sequence.full_name] = SequenceInfo(
             sequence.name, sequence.group, (width, height),
-            sequence.ground_truth, sequence.attributes, sequence.challenge, sequence.origin)
+            sequence.ground_truth, sequence.attributes, sequence.challenge, sequence.origin,
+            None if sequence.challenge or sequence.origin else sequence.other_truth)

@@ -28,13 +28,42 @@ from typing import Any
 from lmsco_ros.evaluation.challenges import apply_challenge
 from lmsco_ros.evaluation.datasets import BrokenSequence, scan_dataset, TrackingSequence
 from lmsco_ros.evaluation.datasets.parts import anchored_parts, AnchorPlan
-from lmsco_ros.evaluation.environment import machine, versions
+from lmsco_ros.evaluation.environment import versions
 from lmsco_ros.evaluation.errors import (
     DatasetError, RequestError, SequenceError, TrackerError)
+from lmsco_ros.evaluation.jobs import Engine
 from lmsco_ros.evaluation.split import load_split
 from lmsco_ros.evaluation.trackers import available_names, resolve, TrackerSpec
 
 _NAMES_SHOWN = 6
+
+
+@dataclass(frozen=True)
+class Shard:
+    """
+    A share of the sequences: every so manieth of them.
+
+    Attributes
+    ----------
+    number, count : int
+        Which one, from 1 on, of how many.
+
+    """
+
+    number: int
+    count: int
+
+    def of(self, sequences: Sequence[TrackingSequence]) -> list[TrackingSequence]:
+        """Return the sequences of this share, or raise `RequestError` where it is empty."""
+        chosen = list(sequences[self.number - 1::self.count])
+        if not chosen:
+            raise RequestError(f'share {self} of {len(sequences)} sequences is empty; make at '
+                               f'most {len(sequences)} of them')
+        return chosen
+
+    def __str__(self) -> str:
+        """Return the share as a command line gives it."""
+        return f'{self.number}/{self.count}'
 
 
 @dataclass(frozen=True)
@@ -58,6 +87,8 @@ class Request:
         Each sequence once with each of these challenges; empty: as it was recorded.
     anchors : AnchorPlan or None
         Parts that begin at anchors along each sequence; None: the sequence as a whole.
+    shard : Shard or None
+        Only this share of the sequences.
 
     """
 
@@ -68,6 +99,7 @@ class Request:
     part: str = 'test'
     challenges: tuple[str, ...] = ()
     anchors: AnchorPlan | None = None
+    shard: Shard | None = None
 
 
 @dataclass(frozen=True)
@@ -117,6 +149,8 @@ def select_sequences(request: Request) -> Selection:
         reasons = ''.join(f'\n  {item.name}: {item.reason}' for item in broken)
         raise DatasetError(f'no usable sequence of {request.dataset} matches '
                            f'{request.pattern!r}{reasons}')
+    if request.shard is not None:
+        chosen = request.shard.of(chosen)
     if request.frames is not None:
         chosen, empty = _cut(chosen, request.frames)
         broken += empty
@@ -176,16 +210,19 @@ def buildable_trackers() -> tuple[tuple[TrackerSpec, ...], tuple[str, ...]]:
     return tuple(specs), tuple(reasons)
 
 
-def describe(request: Request, jobs: int, skipped: Sequence[BrokenSequence]) -> dict[str, Any]:
+def describe(request: Request, engine: Engine,
+             skipped: Sequence[BrokenSequence]) -> dict[str, Any]:
     """Return the conditions of a run for its run file; no paths, no host."""
     return {
         'dataset': request.dataset.resolve().name, 'sequences': request.pattern,
         'frames': request.frames,
         **({'split': request.split.name, 'part': request.part,
             'scenes': load_split(request.split).scenes} if request.split else {}),
-        'challenges': list(request.challenges), 'jobs': jobs,
+        'challenges': list(request.challenges), 'jobs': engine.at_once,
+        'shard': None if request.shard is None else str(request.shard),
         'anchors': None if request.anchors is None else asdict(request.anchors),
-        'date': date.today().isoformat(), 'machine': machine(), 'versions': dict(versions()),
+        'date': date.today().isoformat(), 'machine': dict(engine.machine()),
+        'versions': dict(versions()),
         'skipped': [{'name': item.name, 'reason': item.reason} for item in skipped],
     }
 

@@ -32,10 +32,10 @@ import numpy as np
 import numpy.typing as npt
 
 from lmsco_ros.core.types import BoundingBox, TrackResult, TrackState
+from lmsco_ros.media.colors import TRUTH_COLOR
 from lmsco_ros.visualization.overlay import state_color
 
 _COLUMNS = 6
-_TRUTH = '#ffffff'
 _LEAST_CONTRAST = 40
 _INK, _MUTED, _PAPER = '#1f2933', '#7b8794', '#ffffff'
 
@@ -243,7 +243,7 @@ def _frame_region(axes: Axes, region: BoundingBox) -> None:
 
 def _draw_boxes(axes: Axes, moment: Moment) -> None:
     if moment.truth is not None:
-        _outline(axes, moment.truth, _TRUTH, 1.6, (0, (2, 1.5)))
+        _outline(axes, moment.truth, TRUTH_COLOR, 1.6, (0, (2, 1.5)))
     _outline(axes, moment.result.box, _rgb(moment.result.state), 1.8,
              '--' if moment.result.state is TrackState.LOST else '-')
 

@@ -26,13 +26,13 @@ import numpy as np
 import numpy.typing as npt
 
 from lmsco_ros.core.types import BoundingBox, TrackResult
+from lmsco_ros.media.colors import bgr, TRUTH_COLOR
 from lmsco_ros.media.film import FilmWriter
 from lmsco_ros.visualization.display_range import DisplayRange
 from lmsco_ros.visualization.overlay import draw_box, draw_targets
 
 # Below this height text hides much of the scene; small sensors are shown enlarged.
 _COMFORTABLE_HEIGHT = 480
-_TRUTH_COLOR = (235, 235, 235)
 
 
 class OverlayVideo:
@@ -91,7 +91,7 @@ class OverlayVideo:
             large = np.asarray(
                 cv2.cvtColor(large, cv2.COLOR_GRAY2BGR) if large.ndim == 2 else large.copy(),
                 np.uint8)
-            draw_box(large, scaled(truth, factor), _TRUTH_COLOR, thickness=1)
+            draw_box(large, scaled(truth, factor), bgr(TRUTH_COLOR), thickness=1)
         drawn = {number: replace(result, box=scaled(result.box, factor))
                  for number, result in results.items()}
         canvas = draw_targets(large, drawn, next(iter(drawn)), label=label)

@@ -33,9 +33,10 @@ import subprocess
 import time
 
 from lmsco_ros.core import BoundingBox, TrackState
+from lmsco_ros.evaluation.errors import SequenceError
 from lmsco_ros.evaluation.trackers import Answer
 
-TRACK, MISS, LOSE, RAISE, DIE, REFUSE, WAIT, END, MUMBLE = range(9)
+TRACK, MISS, LOSE, RAISE, DIE, REFUSE, WAIT, END, MUMBLE, AXE = range(10)
 
 
 class Scripted:
@@ -53,6 +54,10 @@ class Scripted:
             os._exit(7)
         if command == END:
             os.kill(os.getpid(), signal.SIGTERM)
+        if command == AXE:
+            # What takes a whole worker of a cluster with it, such as too much memory.
+            os.kill(os.getppid(), signal.SIGKILL)
+            time.sleep(1000)
         if command == MUMBLE:
             return 'somewhere'
         if command == WAIT:
@@ -64,6 +69,22 @@ class Scripted:
 
     def close(self):
         pass
+
+
+class Here:
+    # Images that only one process sees.
+    signature = 'here'
+
+    def __init__(self, frames):
+        self._frames, self._process = frames, os.getpid()
+
+    def __len__(self):
+        return len(self._frames)
+
+    def __getitem__(self, index):
+        if os.getpid() != self._process:
+            raise SequenceError('there is no such file')
+        return self._frames[index]
 
 
 def wait(gate):

@@ -17,20 +17,23 @@
 import json
 
 import cv2
+import numpy as np
 import pytest
 import typer
 from typer.testing import CliRunner
 
-from lmsco_ros.cli.evaluate import register
+from lmsco_ros.cli import evaluate, results
+from lmsco_ros.evaluation.merging import merged_run
 
-TRACK, MISS = 0, 1
+TRACK, MISS, DIE = 0, 1, 4
 
 
 @pytest.fixture
 def lmsco():
     """Return a function that runs the commands of this module."""
     app = typer.Typer()
-    register(app)
+    evaluate.register(app)
+    results.register(app)
 
     def run(*words):
         return CliRunner().invoke(app, [str(word) for word in words])
@@ -64,6 +67,53 @@ def test_evaluate_then_results(lmsco, dataset, scripted, tmp_path):
     written = lmsco('results', output, '--page', table)
     assert written.exit_code == 0, written.output
     assert '| Scripted |' in table.read_text(encoding='utf-8')
+
+
+@pytest.mark.parametrize('protocol', ['ope', 'vot', 'anchors'])
+def test_a_process_that_died_has_its_place_in_the_report(lmsco, dataset, scripted, tmp_path,
+                                                         vot_folder, protocol):
+    vot_folder(dataset / 'vot_tir' / 'deadly', [TRACK, DIE] + [TRACK] * 3)
+    output = tmp_path / 'out'
+    made = lmsco('evaluate', dataset, '--tracker', scripted, '--output', output,
+                 '--protocol', protocol)
+    assert made.exit_code == 0, made.output
+    page = (output / 'report.html').read_text(encoding='utf-8')
+    assert 'Scripted crashed on vot_tir/deadly' in page and 'exit code 7' in page
+
+
+@pytest.mark.parametrize('words', [(), ('--protocol', 'anchors', '--every', 4),
+                                   ('--challenge', 'telemetry', '--challenge', 'dead_pixels')])
+def test_shares_make_the_results_of_all_sequences(lmsco, dataset, scripted, tmp_path, vot_folder,
+                                                  words):
+    for number in range(4):
+        vot_folder(dataset / 'other' / f'clip{number}', [TRACK] * (4 + number))
+    common = ('evaluate', dataset, '--tracker', scripted, *words)
+    for share in ('1/3', '2/3', '3/3'):
+        made = lmsco(*common, '--shard', share, '--output', tmp_path / share[0])
+        assert made.exit_code == 0, made.output
+    assert lmsco(*common, '--output', tmp_path / 'all').exit_code == 0
+    protocol = 'anchors' if '--every' in words else 'ope'
+    shares = [tmp_path / number for number in '231']
+    merged, whole = merged_run(shares, protocol), merged_run([tmp_path / 'all'], protocol)
+    assert [item.full_name for item in merged.sequences] == [
+        item.full_name for item in whole.sequences]
+    for one, other in zip(merged.traces['Scripted'], whole.traces['Scripted']):
+        np.testing.assert_array_equal(one.boxes, other.boxes)
+    assert '--shard 2/3' in (tmp_path / '2' / 'report.html').read_text(encoding='utf-8')
+    page = tmp_path / 'results.md'
+    assert lmsco('results', *shares, '--page', page).exit_code == 0
+    assert '--shard' not in page.read_text(encoding='utf-8')
+
+
+def test_folders_that_do_not_make_one_table_are_told(lmsco, dataset, scripted, tmp_path):
+    common = ('evaluate', dataset, '--tracker')
+    assert lmsco(*common, scripted, '--output', tmp_path / 'one').exit_code == 0
+    assert lmsco(*common, 'hcs', '--shard', '2/2', '--output', tmp_path / 'two').exit_code == 0
+    told = lmsco('results', tmp_path / 'one', tmp_path / 'two', '--page', tmp_path / 'page.md')
+    assert told.exit_code == 1 and 'no folder has hcs on vot_tir/rough; tables' in told.output
+    assert lmsco(*common, scripted, '--frames', 5, '--output', tmp_path / 'cut').exit_code == 0
+    told = lmsco('results', tmp_path / 'one', tmp_path / 'cut', '--page', tmp_path / 'page.md')
+    assert told.exit_code == 1 and 'has another vot_tir/' in told.output
 
 
 def test_several_starts_from_the_command_to_the_tables(lmsco, dataset, scripted, tmp_path,

@@ -276,3 +276,45 @@ def test_an_image_that_cannot_be_read_makes_the_sequence_a_broken_one(tmp_path):
     text(tmp_path / 'groundtruth.txt', '1,1,3,3', '1,1,3,3')
     with pytest.raises(SequenceError, match=r'0002\.png is not a readable image'):
         only(tmp_path).frames[1]
+
+
+def test_boxes_of_every_tenth_frame_are_continued_and_end_where_the_target_is_absent(tmp_path):
+    images(tmp_path / 'clip' / 'ir', 25)
+    text(tmp_path / 'clip' / 'ir.txt', '0 0 10 10', '10 20 20 10', '0 0 0 0')
+    boxes = only(tmp_path).ground_truth
+    np.testing.assert_allclose(boxes[[0, 5, 10]], [
+        [0, 0, 10, 10], [5, 10, 15, 10], [10, 20, 20, 10]])
+    assert np.isfinite(boxes[:11]).all() and np.isnan(boxes[11:]).all()
+
+
+def test_a_last_box_of_every_tenth_frame_holds_to_the_end(tmp_path):
+    images(tmp_path / 'clip' / 'ir', 15)
+    text(tmp_path / 'clip' / 'ir.txt', '0 0 10 10', '10 20 20 10')
+    np.testing.assert_array_equal(only(tmp_path).ground_truth[10:], [[10, 20, 20, 10]] * 5)
+
+
+def test_rows_of_every_frame_and_too_few_are_told_from_every_tenth(tmp_path):
+    images(tmp_path / 'clip' / 'ir', 11)
+    text(tmp_path / 'clip' / 'ir.txt', *['0 0 10 10'] * 11)
+    assert len(only(tmp_path)) == 11
+    text(tmp_path / 'clip' / 'ir.txt', *['0 0 10 10'] * 3)
+    assert '11 frames but 3 rows of ground truth' in reason(tmp_path)
+
+
+def test_one_truth_of_both_channels_comes_before_that_of_the_infrared_one(tmp_path):
+    images(tmp_path / 'clip' / 'ir', 1)
+    text(tmp_path / 'clip' / 'ir.txt', '0 0 10 10')
+    text(tmp_path / 'clip' / 'groundtruth.txt', '5 5 10 10')
+    assert only(tmp_path).ground_truth.tolist() == [[5, 5, 10, 10]]
+
+
+def test_boxes_of_the_visible_channel_stand_beside_those_of_the_infrared_one(tmp_path):
+    images(tmp_path / 'clip' / 'i', 2)
+    text(tmp_path / 'clip' / 'groundTruth_i.txt', '0 0 10 10', '15 25 5 5')
+    text(tmp_path / 'clip' / 'groundTruth_v.txt', '1 0 11 10', '6 5 16 25')
+    sequence = only(tmp_path)
+    assert sequence.ground_truth.tolist() == [[0, 0, 10, 10], [5, 5, 10, 20]]
+    assert sequence.other_truth.tolist() == [[1, 0, 10, 10], [6, 5, 10, 20]]
+    assert sequence.first(1).other_truth.tolist() == [[1, 0, 10, 10]]
+    text(tmp_path / 'clip' / 'groundTruth_v.txt', '1 0 11 10')
+    assert '2 frames but 1 rows' in reason(tmp_path)

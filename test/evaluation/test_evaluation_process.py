@@ -69,11 +69,11 @@ class Evaluations:
                              'PYTHONPATH': f'{REPOSITORY}:{modules}'}
         self._started = []
 
-    def start(self):
+    def start(self, *words):
         """Start an evaluation in a process group of its own, as a shell does."""
         process = subprocess.Popen(
-            self._words, env=self._environment, stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
-            text=True, start_new_session=True,
+            [*self._words, *words], env=self._environment, stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT, text=True, start_new_session=True,
             # A shell without job control has what it starts in the background ignore Ctrl-C.
             preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL))
         self._started.append(process)
@@ -121,9 +121,14 @@ def whole(evaluations):
     return run
 
 
-def test_killed_evaluation_goes_on_where_it_was(evaluations):
-    first = evaluations.start()
+ENGINES = pytest.mark.parametrize('engine', ['local', 'dask'])
+
+
+@ENGINES
+def test_killed_evaluation_goes_on_where_it_was(evaluations, engine):
+    first = evaluations.start('--engine', engine)
     workers = evaluations.waiting()
+    until(lambda: evaluations.records() == {'calm'})
     first.kill()
     until(lambda: not any(map(lives, workers)))
     assert evaluations.records() == {'calm'}
@@ -134,11 +139,13 @@ def test_killed_evaluation_goes_on_where_it_was(evaluations):
     whole(evaluations)
 
 
+@ENGINES
 @pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM, signal.SIGHUP],
                          ids=lambda number: number.name)
-def test_ended_evaluation_keeps_what_was_finished_and_says_so(evaluations, number):
-    first = evaluations.start()
+def test_ended_evaluation_keeps_what_was_finished_and_says_so(evaluations, number, engine):
+    first = evaluations.start('--engine', engine)
     workers = evaluations.waiting()
+    until(lambda: evaluations.records() == {'calm'})
     os.killpg(first.pid, number)
     said, _ = first.communicate()
     assert first.returncode == 128 + number and 'Traceback' not in said

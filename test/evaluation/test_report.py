@@ -30,7 +30,10 @@ from lmsco_ros.evaluation.report.pictures import encode, failure_strip, thumbnai
 from lmsco_ros.evaluation.results_page import results_page
 from lmsco_ros.evaluation.run_file import EvaluationRun, read_run, SequenceInfo, write_run
 from lmsco_ros.evaluation.split import Split
+from lmsco_ros.evaluation.summaries.score import size_note
 from lmsco_ros.evaluation.trace import Trace
+from lmsco_ros.evaluation.whole_file import write_json
+from lmsco_ros.media.colors import bgr, TRUTH_COLOR
 
 VOID = {'meta', 'img', 'rect', 'line', 'br', 'link'}
 TRACKERS = ('hcs', 'csrt', 'lazy')
@@ -154,9 +157,9 @@ def test_pictures_mark_truth_and_answer(sequences):
     strip = failure_strip(sequences[0].frames, truth, truth + (6, 6, 0, 0), (2, 5), '#ff0000')
     assert strip.shape == (160, 2 * 210 + 4, 3)
     levels = strip.astype(int)
-    green = (levels[..., 1] > 150) & (levels[..., 2] < 120)
+    true = np.abs(levels - bgr(TRUTH_COLOR)).max(axis=-1) < 12
     red = (levels[..., 2] > 150) & (levels[..., 1] < 80)
-    assert green.sum() > 40 and red.sum() > 40
+    assert true.sum() > 40 and red.sum() > 40
     assert thumbnail(sequences[0]).shape == (100, 132, 3)
     assert encode(strip, '.png')[1:4] == b'PNG'
 
@@ -168,7 +171,6 @@ def test_command_can_be_repeated(runs):
 
 
 def test_results_page_has_a_table_for_each_kind_of_scene(tmp_path, runs):
-    from lmsco_ros.evaluation.whole_file import write_json
     for protocol, run in runs.items():
         for name, traces in run.traces.items():
             for info, trace in zip(run.sequences, traces):
@@ -176,8 +178,10 @@ def test_results_page_has_a_table_for_each_kind_of_scene(tmp_path, runs):
         write_run(tmp_path, protocol, run.sequences,
                   {name: [f'{protocol}-{name}-{info.group}.json' for info in run.sequences]
                    for name in TRACKERS}, run.context)
-    split = Split('thermal', {}, {'ground-level': ('vot_tir', 'ptb_tir'),
-                                  'aerial': ('anti_uav_ir', 'drone_ir')}, 'Few sequences.\n')
+    names = frozenset(item.full_name for item in run.sequences)
+    split = Split('thermal', {'test': names}, {'ground-level': ('vot_tir', 'ptb_tir'),
+                                               'aerial': ('anti_uav_ir', 'drone_ir')},
+                  'Few sequences.\n')
     text = results_page([tmp_path], split)
     titles = [line for line in text.splitlines() if line.startswith('## ')]
     assert titles == ['## Ground-level (vot_tir, ptb_tir)', '## Aerial (anti_uav_ir, drone_ir)',
@@ -191,6 +195,32 @@ def test_results_page_has_a_table_for_each_kind_of_scene(tmp_path, runs):
     again = read_run(tmp_path, 'vot')
     assert again.traces['lazy'][0].failures == (12,)
     assert np.allclose(again.traces['csrt'][1].boxes, runs['vot'].traces['csrt'][1].boxes)
+
+
+@pytest.mark.parametrize('named, told', [(True, True), (False, False)])
+def test_what_a_split_says_is_said_of_its_sequences_only(tmp_path, runs, named, told):
+    run = runs['ope']
+    for name, traces in run.traces.items():
+        for info, trace in zip(run.sequences, traces):
+            write_json(tmp_path / f'{name}-{info.group}.json', trace.to_json())
+    write_run(tmp_path, 'ope', run.sequences, {
+        name: [f'{name}-{info.group}.json' for info in run.sequences] for name in TRACKERS},
+        run.context)
+    names = {item.full_name for item in run.sequences} if named else {'vot_tir/elsewhere'}
+    split = Split('mine', {'test': frozenset(names)}, {}, 'Picked as hard ones.\n')
+    assert ('Picked as hard ones.' in results_page([tmp_path], split)) is told
+
+
+def test_auroc_compares_sizes_where_all_frames_are_near(parse, runs):
+    run = runs['ope']
+    near = 'All frames of hcs'
+    truths = [info.ground_truth for info in run.sequences]
+    for distance, told in ((5, True), (5.1, False)):
+        traces = tuple(replace(trace, boxes=truth + (distance, 0, 0, 0))
+                       for trace, truth in zip(run.traces['hcs'], truths))
+        changed = replace(run, traces={**run.traces, 'hcs': traces})
+        assert (near in size_note(changed)) is told
+        assert any(near in text for text in parse({'ope': changed}).text) is told
 
 
 def test_absences_have_a_table_only_where_there_are_any(parse, runs):

@@ -25,13 +25,14 @@ import pytest
 
 from lmsco_ros.evaluation.datasets import scan_dataset
 from lmsco_ros.evaluation.errors import DatasetError, EvaluationError, ResultError
+from lmsco_ros.evaluation.jobs import Job
 from lmsco_ros.evaluation.record_store import read_record, RecordStore
 from lmsco_ros.evaluation.run_file import read_run, read_runs
 from lmsco_ros.evaluation.runner import Evaluation
 from lmsco_ros.evaluation.trace import Trace
 from lmsco_ros.evaluation.trackers import resolve
 from lmsco_ros.evaluation.whole_file import write_json, write_whole
-from lmsco_ros.evaluation.worker_pool import Job
+from lmsco_ros.evaluation.worker_pool import LocalProcesses
 
 TRACK, MISS, LOSE, RAISE, DIE, REFUSE, WAIT, END, MUMBLE = range(9)
 
@@ -58,19 +59,19 @@ def evaluation(tmp_path, dataset, scripted):
 def test_an_interrupted_run_resumes_without_losing_or_repeating(tmp_path, evaluation):
     first = evaluation()
     assert len(first.pending) == 3
-    running = first.run(workers=1)
+    running = first.run(LocalProcesses(1))
     done, _ = next(running)
     running.close()
     second = evaluation()
     assert [job.sequence.name for job in second.done] == [done.sequence.name]
-    rest = [job.sequence.name for job, _ in second.run(workers=2)]
+    rest = [job.sequence.name for job, _ in second.run(LocalProcesses(2))]
     assert sorted([done.sequence.name, *rest]) == ['calm', 'deadly', 'rough']
     assert not evaluation().pending
 
 
 def test_crashes_are_recorded_and_the_others_go_on(tmp_path, evaluation):
     plan = evaluation()
-    list(plan.run(workers=1))
+    list(plan.run(LocalProcesses(1)))
     plan.finish({'date': '2026-01-01'})
     run = read_run(tmp_path / 'out', 'ope')
     traces = dict(zip((sequence.name for sequence in run.sequences), run.traces['Scripted']))
@@ -83,7 +84,8 @@ def test_crashes_are_recorded_and_the_others_go_on(tmp_path, evaluation):
 
 def test_an_answer_that_is_none_is_a_crash(tmp_path, vot_folder, scripted):
     sequences = scan_dataset(vot_folder(tmp_path / 'seq', [TRACK, TRACK, MUMBLE])).sequences
-    ((_, outcome),) = Evaluation([resolve(scripted)], sequences, 'ope', tmp_path).run(workers=1)
+    plan = Evaluation([resolve(scripted)], sequences, 'ope', tmp_path)
+    ((_, outcome),) = plan.run(LocalProcesses(1))
     assert outcome.error.startswith('frame 2: ') and outcome.updates
 
 
@@ -92,13 +94,13 @@ def test_a_worker_that_somebody_ends_is_no_crash_of_its_tracker(tmp_path, vot_fo
     sequences = scan_dataset(vot_folder(tmp_path / 'data' / 'b', [TRACK, END]).parent).sequences
     plan = Evaluation([resolve(scripted)], sequences, 'ope', tmp_path / 'out')
     with pytest.raises(EvaluationError, match='a worker process was ended by SIGTERM'):
-        list(plan.run(workers=1))
+        list(plan.run(LocalProcesses(1)))
     again = Evaluation([resolve(scripted)], sequences, 'ope', tmp_path / 'out')
     assert [job.sequence.name for job in again.pending] == ['b']
 
 
 def test_protocols_and_code_have_records_of_their_own(tmp_path, evaluation, dataset):
-    list(evaluation().run(workers=1))
+    list(evaluation().run(LocalProcesses(1)))
     assert len(evaluation('vot').pending) == 3
     module = tmp_path / 'modules' / 'scripted_tracker.py'
     module.write_text(module.read_text(encoding='utf-8') + '\n# changed\n', encoding='utf-8')
@@ -108,7 +110,7 @@ def test_protocols_and_code_have_records_of_their_own(tmp_path, evaluation, data
 def test_a_sequence_that_breaks_on_the_way_is_skipped_for_all(tmp_path, evaluation, dataset):
     (dataset / 'calm' / 'ir' / '00000003.png').write_bytes(b'no image')
     plan = evaluation()
-    list(plan.run(workers=1))
+    list(plan.run(LocalProcesses(1)))
     plan.finish({})
     assert [item.name for item in plan.skipped] == ['data/calm']
     assert '00000003.png' in plan.skipped[0].reason

@@ -20,6 +20,7 @@ from lmsco_ros.evaluation.datasets import scan_dataset
 from lmsco_ros.evaluation.errors import RequestError
 from lmsco_ros.evaluation.session import describe, Request, select_sequences
 from lmsco_ros.evaluation.split import load_split
+from lmsco_ros.evaluation.worker_pool import LocalProcesses
 
 SPLIT = """
 parts:
@@ -50,9 +51,9 @@ def test_only_the_part_is_evaluated_and_told_without_a_path(tmp_path, split, vot
     request = Request(tmp_path / 'data', split=split, part='night')
     selection = select_sequences(request)
     assert [item.full_name for item in selection.sequences] == ['roof/walker']
-    told = describe(request, 1, ())
+    told = describe(request, LocalProcesses(1), ())
     assert (told['split'], told['part']) == ('split.yaml', 'night')
-    assert 'split' not in describe(Request(tmp_path / 'data'), 1, ())
+    assert 'split' not in describe(Request(tmp_path / 'data'), LocalProcesses(1), ())
 
 
 @pytest.mark.parametrize('part, reason', [

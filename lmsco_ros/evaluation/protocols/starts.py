@@ -62,7 +62,7 @@ def start_outcomes(ground_truth: Array, trace: Trace) -> Iterator[StartOutcome]:
 
     """
     absent = is_absent(ground_truth)
-    ends = (*trace.starts[1:], len(absent))
+    ends = (*trace.starts, len(absent))[1:]
     for start, end in zip(trace.starts, ends, strict=True):
         after = slice(start + 1, min(start + 1 + RETURN_FRAMES, end))
         away = absent[after]

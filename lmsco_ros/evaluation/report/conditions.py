@@ -32,6 +32,7 @@ def command_line(run: EvaluationRun) -> str:
     plan = context.get('anchors') or {}
     options = {'split': context.get('split'), 'part': context.get('part'),
                'frames': context.get('frames'),
+               'shard': context.get('shard'),
                'every': plan.get('spacing'), 'length': plan.get('length')}
     for option, value in options.items():
         if value:

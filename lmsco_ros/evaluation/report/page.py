@@ -17,7 +17,7 @@
 from __future__ import annotations
 
 import base64
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from importlib import resources
 from io import BytesIO
@@ -32,31 +32,34 @@ from lmsco_ros.evaluation.challenges import CHALLENGES
 from lmsco_ros.evaluation.datasets import TrackingSequence
 from lmsco_ros.evaluation.execution import PROTOCOLS
 from lmsco_ros.evaluation.protocols.bootstrap import mean_estimate
+from lmsco_ros.evaluation.published import (
+    published_note, PublishedFile, summarize_published)
 from lmsco_ros.evaluation.record_store import file_name
 from lmsco_ros.evaluation.report.conditions import conditions, extent, problems
 from lmsco_ros.evaluation.report.failures import worst_failures
 from lmsco_ros.evaluation.report.formatting import number, spread_warning
 from lmsco_ros.evaluation.report.one_pass_plots import one_pass_plots
-from lmsco_ros.evaluation.report.pictures import (
-    encode, failure_strip, thumbnail, TRUTH_COLOR)
+from lmsco_ros.evaluation.report.pictures import encode, failure_strip, thumbnail
 from lmsco_ros.evaluation.report.score_plots import score_plots
-from lmsco_ros.evaluation.report.style import looks
+from lmsco_ros.evaluation.report.style import looks, PUBLISHED_COLOR
 from lmsco_ros.evaluation.report.supervised_plots import expected_overlap_plot, supervised_plots
 from lmsco_ros.evaluation.report.tables import (
-    absence_table, anchor_table, border_table, Cell, confidence_table, consistency_table,
-    difference_rows, one_pass_table, reliability_table, Row, score_table, start_table,
-    supervised_table, Table)
+    absence_table, anchor_table, benchmark_table, border_table, Cell, confidence_table,
+    consistency_table, difference_rows, one_pass_table, reliability_table, Row, score_table,
+    start_table, supervised_table, Table)
 from lmsco_ros.evaluation.run_file import EvaluationRun
 from lmsco_ros.evaluation.summaries.anchors import anchor_interval, summarize_anchors
 from lmsco_ros.evaluation.summaries.attributes import attribute_names, summarize_attributes
+from lmsco_ros.evaluation.summaries.benchmarks import summarize_benchmarks
 from lmsco_ros.evaluation.summaries.confidence import confidence_parts, summarize_confidence
 from lmsco_ros.evaluation.summaries.consistency import consistency_parts, summarize_consistency
 from lmsco_ros.evaluation.summaries.differences import differences
-from lmsco_ros.evaluation.summaries.one_pass import summarize_one_pass
-from lmsco_ros.evaluation.summaries.score import summarize_scores
+from lmsco_ros.evaluation.summaries.one_pass import OnePassSummary, summarize_one_pass
+from lmsco_ros.evaluation.summaries.score import size_note, summarize_scores
 from lmsco_ros.evaluation.summaries.starts import summarize_starts
 from lmsco_ros.evaluation.summaries.supervised import eao_interval, summarize_supervised
 from lmsco_ros.evaluation.whole_file import write_whole
+from lmsco_ros.media.colors import TRUTH_COLOR
 
 _TITLE = 'Thermal tracking evaluation'
 
@@ -71,7 +74,8 @@ class _Heat:
 
 
 def write_report(output: Path, runs: Mapping[str, EvaluationRun],
-                 sequences: Mapping[str, TrackingSequence]) -> Path:
+                 sequences: Mapping[str, TrackingSequence],
+                 published: Sequence[PublishedFile] = ()) -> Path:
     """
     Write `report.html`, and each plot and strip as a PNG file beside it.
 
@@ -83,6 +87,8 @@ def write_report(output: Path, runs: Mapping[str, EvaluationRun],
         The run under each protocol that has one.
     sequences : mapping of str to TrackingSequence
         Images of the sequences by full name; those missing get no pictures.
+    published : sequence of PublishedFile
+        Figures of others that stand beside those of the one-pass run.
 
     Returns
     -------
@@ -94,12 +100,15 @@ def write_report(output: Path, runs: Mapping[str, EvaluationRun],
     caution = spread_warning(len(main.wholes))
     pictures = output / 'pictures'
     trackers = dict.fromkeys(name for run in runs.values() for name in run.trackers)
+    others = summarize_published(runs['ope'], published) if 'ope' in runs else ()
     colors = {name: look.color for name, look in looks(trackers).items()}
+    colors.update((item.tracker, PUBLISHED_COLOR) for item in others)
     page = _template().render(
         title=_TITLE, subtitle=_subtitle(main, trackers), colors=colors,
         truth_color=TRUTH_COLOR, problems=[caution] * bool(caution) + problems(runs),
         conditions=conditions(runs),
-        ope=_one_pass(runs['ope'], pictures) if 'ope' in runs else None,
+        ope=_one_pass(runs['ope'], pictures, others) if 'ope' in runs else None,
+        published=published_note(published, others),
         vot=_supervised(runs['vot'], pictures) if 'vot' in runs else None,
         anchors=_several_starts(runs['anchors'], pictures) if 'anchors' in runs else None,
         failures=list(_failures(main, sequences, colors, pictures)),
@@ -122,11 +131,13 @@ def _subtitle(run: EvaluationRun, trackers: Iterable[str]) -> str:
             f'{run.context.get("date", "")}')
 
 
-def _one_pass(run: EvaluationRun, folder: Path) -> dict[str, Any]:
+def _one_pass(run: EvaluationRun, folder: Path,
+              others: Sequence[OnePassSummary]) -> dict[str, Any]:
     summaries, scores = summarize_one_pass(run), summarize_scores(run)
-    aucs = {item.tracker: item.aucs for item in summaries}
+    aucs = {item.tracker: item.aucs for item in (*summaries, *others)}
     return {
-        'table': one_pass_table(summaries),
+        'table': one_pass_table((*summaries, *others)),
+        'benchmarks': benchmark_table(summarize_benchmarks(run)),
         'plots': _save_plots(one_pass_plots(summaries), folder),
         'differences': difference_rows(differences(aucs, higher_is_better=True), 3),
         'attributes': _attributes(run, 'frames'),
@@ -143,7 +154,8 @@ def _confidence(run: EvaluationRun, challenge: str) -> dict[str, Any]:
     title = f'{challenge}: {CHALLENGES[challenge].description}' if challenge else ''
     tables = (score_table(summarize_scores(run)), confidence_table(summaries),
               absence_table(summaries), start_table(summarize_starts(run)))
-    return {'title': title, 'tables': [table for table in tables if table is not None]}
+    return {'title': title, 'note': size_note(run),
+            'tables': [table for table in tables if table is not None]}
 
 
 def _consistency(run: EvaluationRun) -> list[dict[str, Any]]:

@@ -20,18 +20,17 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import cv2
-from matplotlib.colors import to_rgb
 import numpy as np
 import numpy.typing as npt
 
 from lmsco_ros.evaluation.datasets import TrackingSequence
 from lmsco_ros.evaluation.datasets.frames import FrameSource
 from lmsco_ros.evaluation.geometry import is_absent
+from lmsco_ros.media.colors import bgr, TRUTH_COLOR
 
 Picture = npt.NDArray[np.uint8]
 Boxes = npt.NDArray[np.float64]
 
-TRUTH_COLOR = '#4cff6a'
 _THUMBNAIL = (132, 100)
 _PANEL = (210, 160)
 _GAP = 4
@@ -133,7 +132,7 @@ def _panel(view: Picture, region: npt.NDArray[np.float64], marks: list[_Mark],
         if np.isfinite(mark.box).all():
             low = np.round(mark.box[:2] * scale + offset).astype(int)
             high = np.round((mark.box[:2] + mark.box[2:]) * scale + offset).astype(int)
-            cv2.rectangle(panel, low.tolist(), high.tolist(), _bgr(mark.color), mark.line,
+            cv2.rectangle(panel, low.tolist(), high.tolist(), bgr(mark.color), mark.line,
                           cv2.LINE_AA)
     return panel
 
@@ -142,7 +141,3 @@ def _caption(panel: Picture, text: str) -> None:
     for color, thickness in (((0, 0, 0), 3), ((255, 255, 255), 1)):
         cv2.putText(panel, text, (6, 16), cv2.FONT_HERSHEY_SIMPLEX, 0.42, color, thickness,
                     cv2.LINE_AA)
-
-
-def _bgr(color: str) -> tuple[int, ...]:
-    return tuple(round(255 * part) for part in reversed(to_rgb(color)))

@@ -25,6 +25,8 @@ from matplotlib.figure import Figure
 
 _COLORS = ('#c1121f', '#1d4e89', '#0096c7', '#e09f3e', '#6a4c93', '#3a3a3a',
            '#d36ba0', '#7f9c3b', '#b5838d', '#8d5a2b', '#9a9a9a', '#5f0f40')
+# Of trackers that are in tables only.
+PUBLISHED_COLOR = '#c4c9d1'
 _MARKERS = 'osD^vP*X<>hp'
 _SIZE = (5.6, 4.2)
 _GRID = '#e3e6ea'

@@ -25,6 +25,7 @@ from lmsco_ros.evaluation.protocols.bootstrap import Estimate
 from lmsco_ros.evaluation.protocols.calibration import BINS
 from lmsco_ros.evaluation.report.formatting import interval, number, signed
 from lmsco_ros.evaluation.summaries.anchors import AnchorSummary, StartFigures
+from lmsco_ros.evaluation.summaries.benchmarks import BenchmarkSummary
 from lmsco_ros.evaluation.summaries.confidence import ConfidenceSummary
 from lmsco_ros.evaluation.summaries.consistency import ConsistencySummary, ErrorFigures
 from lmsco_ros.evaluation.summaries.differences import Difference
@@ -34,7 +35,7 @@ from lmsco_ros.evaluation.summaries.starts import StartSummary
 from lmsco_ros.evaluation.summaries.supervised import SupervisedSummary
 
 Summary = TypeVar('Summary', OnePassSummary, SupervisedSummary, AnchorSummary, ConfidenceSummary,
-                  ScoreSummary, StartSummary, ConsistencySummary)
+                  ScoreSummary, StartSummary, ConsistencySummary, BenchmarkSummary)
 
 
 @dataclass(frozen=True)
@@ -116,6 +117,23 @@ def one_pass_table(summaries: Sequence[OnePassSummary]) -> Table:
         _Column('frames/s (processor)', lambda item: item.cpu_rate, 1, ranged=False),
         _Column('frames/s (clock)', lambda item: item.wall_rate, 1, ranged=False))
     return _table(columns, summaries, lambda item: item.success_auc)
+
+
+def benchmark_table(summaries: Sequence[BenchmarkSummary]) -> Table:
+    """Return the measures of single benchmarks."""
+    columns: tuple[_Column[BenchmarkSummary], ...] = (
+        _Column('AO (GOT-10k)', lambda item: item.average_overlap),
+        _Column('SR .5', lambda item: item.success_50),
+        _Column('SR .75', lambda item: item.success_75),
+        _Column('normalized precision at .2 (LaSOT)',
+                lambda item: item.normalized_precision_20),
+        _Column('state accuracy (Anti-UAV)', lambda item: item.state_accuracy))
+    if any(math.isfinite(item.maximum_success.value) for item in summaries):
+        nearer: tuple[_Column[BenchmarkSummary], ...] = (
+            _Column('MSR (RGBT234)', lambda item: item.maximum_success),
+            _Column('MPR 20 px', lambda item: item.maximum_precision))
+        columns += nearer
+    return _table(columns, summaries, None)
 
 
 def supervised_table(summaries: Sequence[SupervisedSummary]) -> Table:

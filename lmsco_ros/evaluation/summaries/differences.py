@@ -19,6 +19,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+import numpy as np
+
 from lmsco_ros.evaluation.geometry import Array
 from lmsco_ros.evaluation.protocols.bootstrap import Estimate, paired_difference
 
@@ -39,7 +41,8 @@ class Difference:
     difference : Estimate
         Mean of `tracker` - `reference` over sequences.
     sequences, better, worse : int
-        Number of sequences, and on how many of them `tracker` was better or worse.
+        Number of sequences that both have a figure of, and on how many of them `tracker` was
+        better or worse.
 
     """
 
@@ -97,6 +100,6 @@ def differences(figures: Mapping[str, Array],
             gain = margin if higher_is_better else -margin
             result.append(Difference(
                 name, reference, paired_difference(values, figures[reference]),
-                sequences=len(values), better=int((gain > 0).sum()),
+                sequences=int(np.isfinite(margin).sum()), better=int((gain > 0).sum()),
                 worse=int((gain < 0).sum())))
     return tuple(result)

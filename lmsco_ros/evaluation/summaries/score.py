@@ -17,12 +17,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+import math
 
 from lmsco_ros.evaluation.protocols.bootstrap import Estimate, estimate
 from lmsco_ros.evaluation.protocols.calibration import (
     calibration_error, calibration_terms, CalibrationTerms)
 from lmsco_ros.evaluation.protocols.confidence import auroc, auroc_terms, mean_auroc
+from lmsco_ros.evaluation.protocols.one_pass import one_pass_figures
 from lmsco_ros.evaluation.run_file import EvaluationRun
+
+_NEAR_PIXELS = 5
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,6 +61,24 @@ class ScoreSummary:
 def summarize_scores(run: EvaluationRun) -> tuple[ScoreSummary, ...]:
     """Return the summary of each tracker, in the order of the run."""
     return tuple(_summarize(run, name) for name in run.trackers)
+
+
+def size_note(run: EvaluationRun) -> str:
+    """Return of which trackers the AUROC says nothing of losses; empty where of none."""
+    names = [name for name in run.trackers if _stays_near(run, name)]
+    if not names:
+        return ''
+    return (f'All frames of {", ".join(names)} are within {_NEAR_PIXELS} pixels of the target: '
+            'what has less than half an overlap there has another size, so AUROC compares sizes '
+            'and says nothing of losses.')
+
+
+def _stays_near(run: EvaluationRun, name: str) -> bool:
+    """Return whether a tracker was near the target in every frame that shows one."""
+    shares = [one_pass_figures(sequence.ground_truth, trace.boxes).precision_at(_NEAR_PIXELS)
+              for sequence, trace in zip(run.sequences, run.traces[name], strict=True)]
+    known = [share for share in shares if math.isfinite(share)]
+    return bool(known) and min(known) == 1
 
 
 def _summarize(run: EvaluationRun, name: str) -> ScoreSummary:
