@@ -37,8 +37,8 @@ def build_app() -> typer.Typer:
         name='lmsco', no_args_is_help=True, pretty_exceptions_enable=False,
         context_settings={'help_option_names': ['-h', '--help']})
     for command in (
-            version, track, replay, make_bag, demo, page, record, evaluate, results, config, weights,
-            doctor):
+            version, track, replay, make_bag, demo, page, record, evaluate, results, config,
+            weights, doctor):
         command.register(app)
     return app
 
