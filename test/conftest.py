@@ -18,6 +18,7 @@ from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 import os
 from pathlib import Path
 import re
+import signal
 import threading
 import zlib
 
@@ -56,6 +57,9 @@ def ros_domain_id(run: str, worker: str, workers: int) -> int:
 
 # The ROS libraries read both variables when the first context starts, so they are set here, on
 # collection, before any test module can import rclpy.
+# What starts in the background of a shell ignores Ctrl-C, and so would all that is tested with it.
+if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
+    signal.signal(signal.SIGINT, signal.default_int_handler)
 os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
 os.environ['ROS_DOMAIN_ID'] = str(ros_domain_id(
     os.environ.get('PYTEST_XDIST_TESTRUNUID', str(os.getpid())),
