@@ -31,7 +31,6 @@ import pickle
 from statistics import median
 from tempfile import TemporaryDirectory
 import time
-import zlib
 
 import cv2
 
@@ -61,7 +60,7 @@ class Costs:
     seconds : float
         Time of client and scheduler.
     sent, received : float
-        Bytes of its job, deflated, and of its outcome.
+        Bytes of its job, and of its outcome.
 
     """
 
@@ -118,7 +117,7 @@ def _costs(folder: Path, tracker: str, jobs: Sequence[Job], tasks: int) -> Costs
         spent = (run_time(cluster, more) - started) / tasks
         outcome = next(iter(cluster.run(jobs[:1])))[1]
     assert not isinstance(outcome, LeftOut)
-    return Costs(spent, len(zlib.compress(pickle.dumps(jobs[0]))), len(pickle.dumps(outcome)))
+    return Costs(spent, len(pickle.dumps(jobs[0])), len(pickle.dumps(outcome)))
 
 
 def _compare(jobs: Sequence[Job], rounds: int) -> tuple[float, float]:

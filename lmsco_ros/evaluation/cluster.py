@@ -28,9 +28,7 @@ from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
 from concurrent.futures import CancelledError
 from contextlib import closing, contextmanager, ExitStack
 import logging
-import pickle
 import uuid
-import zlib
 
 import dask
 from distributed import as_completed, Client, Future, KilledWorker, LocalCluster
@@ -216,8 +214,8 @@ class _Tasks:
         task = (self._name, f'{job.tracker.name} {job.sequence.full_name}', self._tries[number])
         self._tries[number] += 1
         future = self._client.submit(
-            evaluate, number, zlib.compress(pickle.dumps(job)),
-            self._identities[job.tracker.name], self._name, key=task, pure=False)
+            evaluate, number, job, self._identities[job.tracker.name], self._name, key=task,
+            pure=False)
         self._running[future] = number
         return future
 

@@ -23,11 +23,9 @@ machine, and a worker answers its scheduler while a tracker computes.
 from __future__ import annotations
 
 import os
-import pickle
 import signal
 import threading
 from typing import Any, cast
-import zlib
 
 from distributed import get_worker, WorkerPlugin
 
@@ -130,8 +128,7 @@ class TrackerProcesses(WorkerPlugin):
                 process.stop()
 
 
-def evaluate(number: int, content: bytes, expected: tuple[str, str],
-             name: str) -> Outcome:
+def evaluate(number: int, job: Job, expected: tuple[str, str], name: str) -> Outcome:
     """
     Return what came of a job; the task of the cluster.
 
@@ -140,8 +137,8 @@ def evaluate(number: int, content: bytes, expected: tuple[str, str],
     number : int
         Of the job. That it begins is told under the topic `name`, for a worker may not live to
         tell anything after it.
-    content : bytes
-        The job, pickled and deflated.
+    job : Job
+        What is to be done.
     expected : str
         Identity of the code where the job comes from.
     name : str
@@ -157,7 +154,6 @@ def evaluate(number: int, content: bytes, expected: tuple[str, str],
     """
     worker = get_worker()
     worker.log_event(name, (number, 1))
-    job: Job = pickle.loads(zlib.decompress(content))
     processes = cast(TrackerProcesses, worker.plugins[name])
     if processes.identity(job) != tuple(expected):
         raise EvaluationError(

@@ -106,10 +106,10 @@ def test_recording_without_room_for_both_is_left_out(target):
 
 
 def test_one_tracker_for_both_keeps_more_numbers_than_one_for_each(tmp_path):
-    tallies = count(TrackerConfig.preset('default'), map(rendered_crossing, range(2)))
+    tallies = count(TrackerConfig.preset('default'), map(rendered_crossing, range(4)))
     kind = 'two persons, rendered'
     both, each = tallies[kind, 'one for both'], tallies[kind, 'one for each']
-    assert both.pairs == each.pairs == 2 and both.own + both.other + both.lost == 4
+    assert both.pairs == each.pairs == 4 and both.own + both.other + both.lost == 8
     assert both.switches < each.switches and both.own > each.own
     table = crossing_table(tallies).splitlines()
     assert len(table) == 4 and table[2].split(' | ')[2] == 'one for both'
