@@ -34,8 +34,8 @@ __all__ = ['extent_at']
 _SMALLEST, _RATIO, _LARGEST_PART = 8.0, 2**0.5, 0.7
 _ROUNDS = 3
 # Log-odds that a deviation as large as the target itself takes away.
-_DOUBT = 25.0
-_LEAST_WORTH = -8.0
+_DOUBT = 10.0
+_LEAST_WORTH = 0.0
 
 
 def extent_at(network: ExtentNet, view: FrameView, point: Sequence[float]) -> BoundingBox:
@@ -95,10 +95,15 @@ def _sides(view: FrameView) -> list[float]:
 
 
 def _settled(meter: ExtentMeter, view: FrameView, box: BoundingBox) -> Measurement:
-    """Return what is measured around a box, and around what was measured there, and so on."""
+    """
+    Return what is measured around a square, and around what was measured there, and so on.
+
+    Around squares, since the network knows only these of what was never marked.
+    """
     measured = meter(view, box)
     for _ in range(_ROUNDS):
-        measured = meter(view, measured.box)
+        side = measured.box.area**0.5
+        measured = meter(view, BoundingBox.from_center(measured.box.center, (side, side)))
     return measured
 
 

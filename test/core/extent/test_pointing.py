@@ -24,6 +24,7 @@ from lmsco_ros.core.imaging.gain import AutomaticGain
 from lmsco_ros.core.imaging.view import FrameView
 from lmsco_ros.core.types import BoundingBox
 from lmsco_ros.core.weights.store import load_backbone
+from lmsco_ros.synthetic import render_scene, SceneConfig
 
 
 @pytest.fixture(scope='module')
@@ -49,6 +50,14 @@ def test_extent_of_what_stands_out_is_found(network, size, warmer):
     box = BoundingBox.from_center((96, 78), size)
     found = extent_at(network, view([box], warmer), (98, 80))
     assert found.overlap(box) > 0.6
+
+
+@pytest.mark.parametrize('seed', range(3))
+def test_whole_walker_is_found(network, seed):
+    scene = SceneConfig(width=320, height=256, frames=1, clutter=15, seed=seed)
+    image, box = next((frame.image, frame.box) for frame in render_scene(scene))
+    shown = FrameView(image, AutomaticGain(IntensityConfig()).observe(image))
+    assert extent_at(network, shown, box.center).overlap(box) > 0.5
 
 
 def test_of_two_things_the_one_at_the_point_is_found(network):
