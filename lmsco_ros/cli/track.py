@@ -143,12 +143,14 @@ def _run(tracker: MultiTracker, frames: Iterable[RecordedFrame], boxes: Sequence
          truth: list[BoundingBox | None], outputs: RunOutputs, *, expected: int) -> None:
     """Track, write the outputs and tell the figures; the truth is that of the first target."""
     seconds, count, overlaps = 0.0, 0, []
+    told: dict[int, str] = {}
     with outputs, frame_progress() as progress:
         task = progress.add_task('tracking', total=expected)
         for frame, results, spent in _results(tracker, frames, boxes):
             known = truth[frame.index] if frame.index < len(truth) else None
             if not count:
                 _tell_start(boxes, frame)
+            _tell_notes(results, told, frame.index)
             outputs.add(frame, results, known)
             seconds, count = seconds + spent, count + 1
             overlaps += [] if known is None else [_overlap(next(iter(results.values())), known)]
@@ -167,6 +169,14 @@ def _tell_start(boxes: Sequence[BoundingBox], frame: RecordedFrame) -> None:
         if min(x, y) < 0 or x + across > width or y + down > height:
             warn(f'the start box {x:g},{y:g},{across:g},{down:g} reaches beyond the image of '
                  f'{width} x {height} pixels; only the part inside is seen')
+
+
+def _tell_notes(results: Mapping[int, TrackResult], told: dict[int, str], index: int) -> None:
+    """Say what the tracker says in words, unless it is what was told of the frame before."""
+    for number, result in results.items():
+        if result.note and result.note != told.get(number):
+            warn(f'frame {index}, target {number}: {result.note}')
+        told[number] = result.note
 
 
 def _results(tracker: MultiTracker, frames: Iterable[RecordedFrame], boxes: Sequence[BoundingBox],

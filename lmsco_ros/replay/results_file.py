@@ -23,7 +23,7 @@ from types import TracebackType
 
 from lmsco_ros.core.types import TrackResult, TrackState
 
-COLUMNS = ('frame', 'stamp', 'x', 'y', 'width', 'height', 'score', 'state', 'id')
+COLUMNS = ('frame', 'stamp', 'x', 'y', 'width', 'height', 'score', 'state', 'id', 'note')
 
 
 class BoxesFile:
@@ -77,7 +77,8 @@ class BoxesFile:
         if result.state is not TrackState.LOST:
             box = [f'{value:.3f}' for value in result.box.as_tuple()]
         self._append([index, f'{seconds}.{nanoseconds:09d}', *box,
-                      f'{result.score:.4f}', result.state.value, number])
+                      f'{result.score:.4f}', result.state.value, number,
+                      result.note])
         self.rows += 1
 
     def _append(self, values: list[object] | tuple[str, ...]) -> None:

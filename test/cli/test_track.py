@@ -27,7 +27,7 @@ import cv2
 import numpy as np
 import pytest
 
-from lmsco_ros.core.types import BoundingBox
+from lmsco_ros.core.types import BoundingBox, TrackResult, TrackState
 
 
 def rows_of(folder):
@@ -282,6 +282,64 @@ def test_start_box_that_reaches_beyond_the_image_is_told(lmsco, tmp_path, scene_
                                                          is_told):
     outcome = lmsco('track', scene_folder, '--init', box, '--frames', 1, '--output', tmp_path)
     assert ('reaches beyond the image of 160 x 128 pixels' in outcome.words) is is_told
+
+
+def written(folder, images):
+    """Return a folder with these images."""
+    folder.mkdir()
+    for index, image in enumerate(images):
+        cv2.imwrite(str(folder / f'{index}.png'), image)
+    return folder
+
+
+def test_start_on_nothing_is_told_once_and_stands_in_its_rows(lmsco, tmp_path, scene, start):
+    """The other one, which can be seen, has no note."""
+    noise = np.random.default_rng(4).normal(7600, 150, (6, 128, 160)).astype(np.uint16)
+    both = [np.hstack([frame.image, seen]) for frame, seen in zip(scene, noise)]
+    outcome = lmsco('track', written(tmp_path / 'ir', both), '--init', start,
+                    '--init', '230,50,24,30', '--output', tmp_path / 'run')
+    assert outcome.exit_code == 0, outcome.output
+    said = [line for line in outcome.output.splitlines() if 'stands out' in line]
+    assert said == ['note: frame 0, target 2: start: nothing stands out']
+    notes = {number: [row['note'] for row in rows_of(tmp_path / 'run') if row['id'] == number]
+             for number in '12'}
+    assert notes == {'1': [''] * 6, '2': ['start: nothing stands out'] * 6}
+
+
+class NotingTracker:
+    """A tracker that follows nothing, and notes of each target what it is given for a frame."""
+
+    def __init__(self, box, notes):
+        self._box, self._notes = box, iter(notes)
+        self.ids, self.results = (), {}
+
+    def initialize(self, image, box, time):
+        self.ids = (1,)
+        self.update(image, time)
+
+    def update(self, image, time):
+        self.results = {
+            number: TrackResult(self._box, 0.5, TrackState.UNCERTAIN,
+                                np.zeros((4, 4), np.float32), self._box, note=note)
+            for number, note in next(self._notes).items()}
+        return self.results
+
+
+@pytest.mark.parametrize('notes, told', [
+    ([{1: ''}, {1: ''}], []),
+    ([{1: ''}, {1: 'hot'}, {1: 'hot'}], ['frame 1, target 1: hot']),
+    ([{1: 'hot'}, {1: ''}, {1: 'hot'}], ['frame 0, target 1: hot', 'frame 2, target 1: hot']),
+    ([{1: 'hot', 2: 'hot'}, {1: 'cold', 2: 'hot'}],
+     ['frame 0, target 1: hot', 'frame 0, target 2: hot', 'frame 1, target 1: cold'])])
+def test_what_the_tracker_notes_is_told_when_it_appears(lmsco, tmp_path, scene_folder, scene,
+                                                        start, monkeypatch, notes, told):
+    monkeypatch.setattr('lmsco_ros.core.MultiTracker',
+                        lambda settings: NotingTracker(scene[0].box, notes))
+    outcome = lmsco('track', scene_folder, '--init', start, '--frames', len(notes),
+                    '--output', tmp_path / 'run')
+    assert outcome.exit_code == 0, outcome.output
+    assert [line.removeprefix('note: ') for line in outcome.output.splitlines()
+            if line.startswith('note: ')] == told
 
 
 def test_missing_source(lmsco, tmp_path):

@@ -39,13 +39,15 @@ def result(state=TrackState.TRACKING):
 def test_rows_are_exact_and_lost_ones_have_no_box(tmp_path):
     with BoxesFile(tmp_path / 'boxes.csv') as file:
         file.add(0, 1_700_000_000_000_000_007, result())
-        file.add(1, 1_700_000_000_040_000_007, result(TrackState.LOST))
+        file.add(1, 1_700_000_000_040_000_007, replace(
+            result(TrackState.LOST), note='start: nothing, "really", stands out'))
     with (tmp_path / 'boxes.csv').open() as stream:
         first, second = csv.DictReader(stream)
     assert first == {
         'frame': '0', 'stamp': '1700000000.000000007', 'x': '20.250', 'y': '10.000',
         'width': '12.000', 'height': '16.000', 'score': '0.8125', 'state': 'tracking',
-        'id': '1'}
+        'id': '1', 'note': ''}
+    assert second['note'] == 'start: nothing, "really", stands out'
     assert second['x'] == second['height'] == '' and second['state'] == 'lost'
 
 
@@ -128,7 +130,7 @@ def test_full_disk_leaves_no_half_of_a_row(tmp_path_factory, room):
                 file.add(index, 0, result())
     assert full.value.filename == str(path)
     heading, *rows = path.read_text().splitlines(keepends=True)
-    assert len(rows) == file.rows and all(row.endswith(',tracking,1\n') for row in rows)
+    assert len(rows) == file.rows and all(row.endswith(',tracking,1,\n') for row in rows)
     assert sum(map(len, rows)) <= room
 
 
