@@ -21,6 +21,7 @@ from launch.actions import DeclareLaunchArgument, IncludeLaunchDescription
 from launch.launch_description_sources import PythonLaunchDescriptionSource
 from launch.substitutions import LaunchConfiguration
 from launch_ros.actions import Node
+from launch_ros.parameter_descriptions import ParameterValue
 
 HERE = Path(__file__).resolve().parent
 
@@ -41,6 +42,18 @@ def generate_launch_description() -> LaunchDescription:
             'port', default_value='8080', description='Port of the page'),
         DeclareLaunchArgument(
             'read_only', default_value='false', description='Whether pages may only look'),
+        DeclareLaunchArgument(
+            'image_transport', default_value='raw', choices=['raw', 'compressed'],
+            description="What the page shows; the tracker's own is in its params_file"),
+        DeclareLaunchArgument(
+            'allowed_origins', default_value='',
+            description='Origins of pages behind a reverse proxy, separated by commas'),
+        DeclareLaunchArgument(
+            'record_folder', default_value='',
+            description='Folder for the bags that pages have recorded; empty: they cannot'),
+        DeclareLaunchArgument(
+            'history_megabytes', default_value='64.0',
+            description='Images that are kept for stepping back'),
         # It takes `image_topic` and `namespace` from here, and its own arguments as well.
         IncludeLaunchDescription(PythonLaunchDescriptionSource(
             str(HERE / 'tracker.launch.py'))),
@@ -49,10 +62,20 @@ def generate_launch_description() -> LaunchDescription:
             executable='console',
             namespace=LaunchConfiguration('namespace'),
             name='lmsco_console',
-            parameters=[{'host': LaunchConfiguration('host'),
-                         'port': LaunchConfiguration('port'),
-                         'read_only': LaunchConfiguration('read_only')}],
+            parameters=[{
+                'host': _given('host', str),
+                'port': _given('port', int),
+                'read_only': _given('read_only', bool),
+                'image_transport': _given('image_transport', str),
+                'allowed_origins': _given('allowed_origins', str),
+                'record_folder': _given('record_folder', str),
+                'history_megabytes': _given('history_megabytes', float)}],
             remappings=[('image_raw', LaunchConfiguration('image_topic'))],
             output='screen',
         ),
     ])
+
+
+def _given(name: str, kind: type) -> ParameterValue:
+    """Return an argument as a parameter of that type: a folder may be called `2026-11-27`."""
+    return ParameterValue(LaunchConfiguration(name), value_type=kind)

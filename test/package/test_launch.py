@@ -14,12 +14,16 @@
 
 """The launch file offers its arguments and hands them on to the one node."""
 
+from dataclasses import fields
 import importlib.util
 from pathlib import Path
 import sys
 from types import ModuleType
 
 import pytest
+import yaml
+
+from lmsco_ros.console.settings import ConsoleSettings
 
 REPOSITORY = Path(__file__).resolve().parents[2]
 LAUNCH_FILE = REPOSITORY / 'launch' / 'tracker.launch.py'
@@ -140,22 +144,40 @@ def test_head_is_started_beside_the_tracker(entities, monkeypatch):
     assert Path(program).is_file()
 
 
-def test_console_is_started_beside_the_tracker(entities, monkeypatch):
-    """Its arguments reach its node, and the tracker comes from its own launch file."""
-    actions, sources = sys.modules['launch.actions'], ModuleType('launch.sources')
-    actions.IncludeLaunchDescription = type('IncludeLaunchDescription', (Recorded,), {})
-    sources.PythonLaunchDescriptionSource = type(
-        'PythonLaunchDescriptionSource', (Recorded,), {})
+@pytest.fixture
+def console(entities, monkeypatch):
+    """Return what the launch file of the console starts, with stand-ins for the packages."""
+    sources, descriptions = ModuleType('launch.sources'), ModuleType('launch_ros.descriptions')
+    for module, name in ((sys.modules['launch.actions'], 'IncludeLaunchDescription'),
+                         (sources, 'PythonLaunchDescriptionSource'),
+                         (descriptions, 'ParameterValue')):
+        setattr(module, name, type(name, (Recorded,), {}))
     monkeypatch.setitem(sys.modules, 'launch.launch_description_sources', sources)
-    found = load(CONSOLE_FILE).positional[0]
-    declared = {item.positional[0]: item.named for item in found
-                if type(item).__name__ == 'DeclareLaunchArgument'}
-    assert set(declared) == {'image_topic', 'namespace', 'host', 'port', 'read_only'}
-    assert all(item['description'] for item in declared.values())
-    *_, included, node = found
+    monkeypatch.setitem(sys.modules, 'launch_ros.parameter_descriptions', descriptions)
+    return load(CONSOLE_FILE).positional[0]
+
+
+def test_console_is_started_beside_the_tracker(console):
+    """It gets namespace and topic, and the tracker comes from its own launch file."""
+    *_, included, node = console
     assert included.positional[0].positional == (str(LAUNCH_FILE),)
     assert (node.named['package'], node.named['executable']) == ('lmsco_ros', 'console')
-    handed = {name: value.positional[0] for name, value in node.named['parameters'][0].items()}
-    assert handed == {name: name for name in ('host', 'port', 'read_only')}
+    assert node.named['namespace'].positional == ('namespace',)
     ((topic, replacement),) = node.named['remappings']
     assert topic == 'image_raw' and replacement.positional == ('image_topic',)
+
+
+def test_parameters_of_the_console_are_arguments_of_its_launch_file(console):
+    """All but the name of the tracker; each has its type, whatever the text looks like."""
+    settings = {field.name: field.default for field in fields(ConsoleSettings)}
+    del settings['tracker']
+    declared = {item.positional[0]: item.named for item in console
+                if type(item).__name__ == 'DeclareLaunchArgument'}
+    assert set(declared) == {'image_topic', 'namespace', *settings}
+    assert all(item['description'] for item in declared.values())
+    handed = {name: (value.positional[0].positional[0], value.named['value_type'])
+              for name, value in console[-1].named['parameters'][0].items()}
+    assert handed == {name: (name, type(default)) for name, default in settings.items()}
+    for name, default in settings.items():
+        text = declared[name]['default_value']
+        assert (text if isinstance(default, str) else yaml.safe_load(text)) == default
