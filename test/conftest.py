@@ -20,6 +20,7 @@ from pathlib import Path
 import re
 import signal
 import threading
+import time
 import zlib
 
 from hypothesis import HealthCheck, settings
@@ -28,6 +29,8 @@ import pytest
 REPOSITORY = Path(__file__).resolve().parents[1]
 # Domains above 101 need ports of the range that Linux hands to outgoing connections.
 LAST_DOMAIN = 101
+# Much more than anything takes, also on a busy machine.
+PATIENCE_SECONDS = 120.0
 
 
 def ros_domain_id(run: str, worker: str, workers: int) -> int:
@@ -72,6 +75,21 @@ settings.register_profile(
     suppress_health_check=[HealthCheck.too_slow])
 settings.register_profile('ci', settings.get_profile('local'), derandomize=True)
 settings.load_profile('ci' if os.environ.get('CI') else 'local')
+
+
+def wait_until(condition):
+    """Wait until a condition holds, and return what it says then."""
+    deadline = time.monotonic() + PATIENCE_SECONDS
+    while not (found := condition()):
+        assert time.monotonic() < deadline, 'waited in vain'
+        time.sleep(0.02)
+    return found
+
+
+@pytest.fixture(scope='session')
+def until():
+    """Return the function that waits until a condition holds, and returns what it says then."""
+    return wait_until
 
 
 @pytest.fixture(scope='session')

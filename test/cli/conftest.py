@@ -65,6 +65,17 @@ def lmsco_process():
         process.communicate()
 
 
+@pytest.fixture
+def until_large(until):
+    """Return a function that waits until a process has written some megabytes into a file."""
+    def wait(file, process):
+        def is_large():
+            assert process.poll() is None, 'it ended before'
+            return file.exists() and file.stat().st_size > 3_000_000
+        until(is_large)
+    return wait
+
+
 @pytest.fixture(scope='session')
 def scene():
     """Return the frames of a small scene."""

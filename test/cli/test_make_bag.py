@@ -15,7 +15,6 @@
 """`lmsco make-bag`: options reach the bag."""
 
 import signal
-import time
 
 import cv2
 import numpy as np
@@ -70,14 +69,10 @@ def test_existing_output_is_refused(lmsco, tmp_path, scene_folder):
 
 
 @pytest.fixture
-def writing(lmsco_process, tmp_path, endless_folder):
+def writing(lmsco_process, tmp_path, endless_folder, until_large):
     """Return a process that has written some megabytes of a bag, and will for long."""
     process = lmsco_process('make-bag', endless_folder, '--output', tmp_path / 'bag')
-    deadline = time.monotonic() + PATIENCE_SECONDS
-    file = tmp_path / 'bag.partial' / 'bag' / 'bag.mcap'
-    while not file.exists() or file.stat().st_size < 3_000_000:
-        assert time.monotonic() < deadline and process.poll() is None
-        time.sleep(0.01)
+    until_large(tmp_path / 'bag.partial' / 'bag' / 'bag.mcap', process)
     assert not (tmp_path / 'bag').exists()
     return process
 

@@ -15,7 +15,6 @@
 """`lmsco record`: what camera and tracker say into a bag, until a signal or the time ends it."""
 
 import signal
-import time
 
 from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import PolygonInstanceStamped, PolygonStamped
@@ -36,14 +35,6 @@ PATIENCE_SECONDS = 100.0
 TOLD = {'status': DiagnosticArray, 'box': PolygonStamped, 'boxes': PolygonInstanceStamped,
         'state': Odometry}
 PIXELS = np.arange(48 * 64, dtype=np.uint16).reshape(48, 64)
-
-
-def wait_until(condition):
-    """Wait for a condition, which must come true."""
-    deadline = time.monotonic() + PATIENCE_SECONDS
-    while not condition():
-        assert time.monotonic() < deadline, 'this never happened'
-        time.sleep(0.01)
 
 
 @pytest.fixture
@@ -108,11 +99,11 @@ def test_images_boxes_and_state_are_recorded(robot, tmp_path, image, topic):
 
 
 @pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM], ids=['SIGINT', 'SIGTERM'])
-def test_signal_ends_it_and_the_bag_is_whole(lmsco_process, robot, tmp_path, number):
+def test_signal_ends_it_and_the_bag_is_whole(lmsco_process, robot, tmp_path, until, number):
     speaker = Speaker(robot, message_from_image(PIXELS), 'image_raw')
     process = lmsco_process('record', '--output', tmp_path / 'flight', '--namespace', '/front',
                             '--tracker', 'thermal')
-    wait_until(speaker.is_heard)
+    until(speaker.is_heard)
     for _ in range(100):
         speaker.speak()
     process.send_signal(number)

@@ -17,7 +17,6 @@
 from collections import Counter
 import csv
 import signal
-import time
 
 import numpy as np
 import pytest
@@ -171,16 +170,12 @@ def test_existing_output_is_refused_at_once(lmsco, tmp_path, bag, start):
 
 
 def test_signal_keeps_what_was_answered_and_says_so(lmsco, lmsco_process, tmp_path, start,
-                                                    endless_folder):
+                                                    endless_folder, until_large):
     bag = tmp_path / 'endless'
     assert lmsco('make-bag', endless_folder, '--frames', 2000, '--output', bag).exit_code == 0
     process = lmsco_process('replay', bag, '--init', start, '--rate', 0, '--output',
                             tmp_path / 'out')
-    file = tmp_path / 'out.partial' / 'out' / 'out.mcap'
-    deadline = time.monotonic() + 100
-    while not file.exists() or file.stat().st_size < 3_000_000:
-        assert time.monotonic() < deadline and process.poll() is None
-        time.sleep(0.01)
+    until_large(tmp_path / 'out.partial' / 'out' / 'out.mcap', process)
     process.send_signal(signal.SIGTERM)
     _, complaints = process.communicate(timeout=100)
     assert process.returncode == 128 + signal.SIGTERM and 'Traceback' not in complaints

@@ -484,22 +484,22 @@ def run(tmp_path):
         process.wait()
 
 
-def test_page_comes_back_after_the_console_was_killed(site, browser, run):
+def test_page_comes_back_after_the_console_was_killed(site, browser, run, until):
     def offered(port):
         process, told = run('lmsco_ros.console.main', '-p', f'port:={port}')
-        deadline = time.monotonic() + PATIENCE
-        while 'the page is at' not in told():
-            assert time.monotonic() < deadline and process.poll() is None, told()
-            time.sleep(0.05)
-        return process, re.search(r'http://127.0.0.1:(\d+)/', told())
+
+        def address():
+            assert process.poll() is None, told()
+            return re.search(r'the page is at (.*:(\d+)/)', told())
+        return process, until(address)
 
     process, address = offered(0)
-    page = Page(browser, address[0])
+    page = Page(browser, address[1])
     process.kill()
     page.until(lambda: page.text('link') == 'not connected')
     assert 'does not answer' in page.text('banner')
     number = page.state['stamp']
-    offered(address[1])
+    offered(address[2])
     page.until(lambda: page.text('link') == 'connected')
     page.until(lambda: int(page.state['stamp']) > int(number) and not page.text('banner'))
     page.start(site)

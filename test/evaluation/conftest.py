@@ -14,11 +14,16 @@
 
 """Small datasets and a tracker of known behavior, for the tests of the evaluation."""
 
+from pathlib import Path
 import sys
 
 import cv2
 import numpy as np
 import pytest
+import typer
+from typer.testing import CliRunner
+
+from lmsco_ros.cli import evaluate, results
 
 SIZE = (64, 48)
 WALK_SIZE = (160, 120)
@@ -187,6 +192,30 @@ def scripted(tmp_path, monkeypatch):
     monkeypatch.syspath_prepend(folder)
     monkeypatch.delitem(sys.modules, 'scripted_tracker', raising=False)
     return 'python:scripted_tracker:Scripted'
+
+
+def process_lives(process):
+    """Return whether a process is there and more than an entry that nobody has read."""
+    try:
+        status = Path(f'/proc/{process}/stat').read_text(encoding='utf-8')
+    except OSError:
+        return False
+    return status.rpartition(')')[2].split()[0] not in 'ZX'
+
+
+@pytest.fixture(scope='session')
+def is_alive():
+    """Return the function that tells of the number of a process whether that is alive."""
+    return process_lives
+
+
+@pytest.fixture
+def lmsco():
+    """Return a function that runs the commands of evaluations."""
+    app = typer.Typer()
+    evaluate.register(app)
+    results.register(app)
+    return lambda *words: CliRunner().invoke(app, [str(word) for word in words])
 
 
 @pytest.fixture

@@ -22,14 +22,10 @@ import os
 from pathlib import Path
 import re
 import signal
-import time
 
 import psutil
 import pytest
-import typer
-from typer.testing import CliRunner
 
-from lmsco_ros.cli import evaluate, results
 from lmsco_ros.evaluation import cluster, cluster_worker
 from lmsco_ros.evaluation.cluster import cluster_at, DaskCluster, local_cluster
 from lmsco_ros.evaluation.cluster_worker import TrackerProcesses
@@ -45,24 +41,6 @@ from lmsco_ros.evaluation.worker_process import EndedError
 distributed = pytest.importorskip('distributed', reason='needs the extra `cluster`')
 
 TRACK, MISS, LOSE, RAISE, DIE, REFUSE, WAIT, END, MUMBLE, AXE = range(10)
-PATIENCE_SECONDS = 120.0
-
-
-def until(condition):
-    """Wait until `condition` returns something and return it."""
-    deadline = time.monotonic() + PATIENCE_SECONDS
-    while not (found := condition()):
-        assert time.monotonic() < deadline, 'waited in vain'
-        time.sleep(0.02)
-    return found
-
-
-def is_alive(process):
-    """Return whether a process is there and more than an entry that nobody has read."""
-    try:
-        return Path(f'/proc/{process}/stat').read_text().rpartition(')')[2].split()[0] not in 'ZX'
-    except OSError:
-        return False
 
 
 @pytest.fixture
@@ -87,10 +65,13 @@ def gate(tmp_path, monkeypatch):
     path.touch()
 
 
-def waiting(gate):
-    """Return the processes in which trackers wait that live."""
-    found = [int(path.name.split('-')[1]) for path in gate.parent.glob('waiting-*')]
-    return [process for process in found if is_alive(process)]
+@pytest.fixture
+def waiting(gate, is_alive):
+    """Return a function that finds the processes in which trackers wait that live."""
+    def find():
+        found = [int(path.name.split('-')[1]) for path in gate.parent.glob('waiting-*')]
+        return [process for process in found if is_alive(process)]
+    return find
 
 
 def parent_of(process):
@@ -140,14 +121,15 @@ def test_a_run_that_was_broken_off_goes_on_with_another_engine(plan, first_there
     assert {done.sequence.name, *rest} == set(MIXED) and done.sequence.name not in rest
 
 
-def test_a_worker_that_is_killed_costs_nothing_but_time(plan, gate, tmp_path):
+def test_a_worker_that_is_killed_costs_nothing_but_time(
+        plan, gate, waiting, until, is_alive):
     evaluation = plan(waits=[TRACK, WAIT, TRACK], **MIXED)
     with local_cluster(2) as engine, ThreadPoolExecutor() as pool:
         running = pool.submit(outcomes, evaluation, engine)
-        (process,) = until(lambda: waiting(gate))
+        (process,) = until(waiting)
         os.kill(parent_of(process), signal.SIGKILL)
         until(lambda: not is_alive(process))
-        until(lambda: waiting(gate))
+        until(waiting)
         gate.touch()
         found = running.result()
     assert set(found) == {'waits', *MIXED} and found['waits'].error is None
@@ -221,7 +203,7 @@ def processes():
 
 
 def test_processes_are_kept_from_job_to_job_and_end_when_nobody_comes(
-        plan, processes, monkeypatch):
+        plan, processes, until, monkeypatch):
     jobs = plan(one=[TRACK] * 3, two=[TRACK] * 3).pending
     assert all(processes.answer(job).error is None for job in jobs)
     ((process, timer),) = processes._idle
@@ -232,24 +214,15 @@ def test_processes_are_kept_from_job_to_job_and_end_when_nobody_comes(
     assert not processes._idle and processes.answer(jobs[0]).error is None
 
 
-def test_a_worker_that_closes_records_no_crash(plan, processes, gate):
+def test_a_worker_that_closes_records_no_crash(plan, processes, waiting, until, is_alive):
     (job,) = plan(waits=[TRACK, WAIT]).pending
     with ThreadPoolExecutor() as pool:
         asked = pool.submit(processes.answer, job)
-        (process,) = until(lambda: waiting(gate))
+        (process,) = until(waiting)
         processes.teardown(None)
         with pytest.raises(EndedError, match='a worker was closed'):
             asked.result()
     assert not is_alive(process)
-
-
-@pytest.fixture
-def lmsco():
-    """Return a function that runs the commands of evaluations."""
-    app = typer.Typer()
-    evaluate.register(app)
-    results.register(app)
-    return lambda *words: CliRunner().invoke(app, [str(word) for word in words])
 
 
 def test_the_command_uses_a_cluster_that_is_there_and_leaves_it_as_it_was(
@@ -296,7 +269,7 @@ def test_what_makes_no_sense_is_misuse(lmsco, plan, scripted, tmp_path, words, r
     assert told.exit_code == 2 and reason in ' '.join(told.output.replace('│', '').split())
 
 
-def test_a_scheduler_that_goes_away_ends_the_run_with_one_sentence(plan, gate):
+def test_a_scheduler_that_goes_away_ends_the_run_with_one_sentence(plan, waiting, until):
     evaluation = plan(waits=[TRACK, WAIT])
     with distributed.LocalCluster(
             1, threads_per_worker=1, host='127.0.0.1', dashboard_address=None) as there, \
@@ -305,11 +278,11 @@ def test_a_scheduler_that_goes_away_ends_the_run_with_one_sentence(plan, gate):
             with cluster_at(there.scheduler_address) as engine:
                 outcomes(evaluation, engine)
         running = pool.submit(run)
-        until(lambda: waiting(gate))
+        until(waiting)
         there.close()
         with pytest.raises(EvaluationError, match='the scheduler went away'):
             running.result()
-    until(lambda: not waiting(gate))
+    until(lambda: not waiting())
 
 
 @pytest.mark.slow

@@ -19,33 +19,13 @@ from pathlib import Path
 import signal
 import subprocess
 import sys
-import time
 
 import pytest
 
 from lmsco_ros.evaluation.run_file import read_run
 
 TRACK, WAIT = 0, 6
-PATIENCE_SECONDS = 120.0
 REPOSITORY = Path(__file__).resolve().parents[2]
-
-
-def until(condition):
-    """Wait until `condition` returns something and return it."""
-    deadline = time.monotonic() + PATIENCE_SECONDS
-    while not (found := condition()):
-        assert time.monotonic() < deadline, 'waited in vain'
-        time.sleep(0.02)
-    return found
-
-
-def lives(process):
-    """Return whether a process is there and more than an entry that nobody has read."""
-    try:
-        status = Path(f'/proc/{process}/stat').read_text(encoding='utf-8')
-    except OSError:
-        return False
-    return status.rpartition(')')[2].split()[0] not in 'ZX'
 
 
 class Evaluations:
@@ -59,7 +39,8 @@ class Evaluations:
 
     """
 
-    def __init__(self, folder, tracker, modules):
+    def __init__(self, folder, tracker, modules, until):
+        self._until = until
         self.output = folder / 'out'
         self._gate = folder / 'gates' / 'open'
         self._gate.parent.mkdir()
@@ -81,8 +62,8 @@ class Evaluations:
 
     def waiting(self, count=1):
         """Return, for trackers that wait, the numbers of their processes and helpers."""
-        found = until(lambda: (names := list(self._gate.parent.glob('waiting-*')))
-                      and len(names) == count and names)
+        found = self._until(lambda: (names := list(self._gate.parent.glob('waiting-*')))
+                            and len(names) == count and names)
         return [int(number) for path in found for number in path.name.split('-')[1:]]
 
     def records(self):
@@ -103,11 +84,11 @@ class Evaluations:
 
 
 @pytest.fixture
-def evaluations(tmp_path, vot_folder, scripted):
+def evaluations(tmp_path, vot_folder, scripted, until):
     """Return evaluations of a dataset of two sequences."""
     vot_folder(tmp_path / 'data' / 'set' / 'calm', [TRACK] * 4)
     vot_folder(tmp_path / 'data' / 'set' / 'waits', [TRACK, WAIT, TRACK])
-    made = Evaluations(tmp_path, scripted, tmp_path / 'modules')
+    made = Evaluations(tmp_path, scripted, tmp_path / 'modules', until)
     yield made
     made.close()
 
@@ -125,12 +106,12 @@ ENGINES = pytest.mark.parametrize('engine', ['local', 'dask'])
 
 
 @ENGINES
-def test_killed_evaluation_goes_on_where_it_was(evaluations, engine):
+def test_killed_evaluation_goes_on_where_it_was(evaluations, engine, until, is_alive):
     first = evaluations.start('--engine', engine)
     workers = evaluations.waiting()
     until(lambda: evaluations.records() == {'calm'})
     first.kill()
-    until(lambda: not any(map(lives, workers)))
+    until(lambda: not any(map(is_alive, workers)))
     assert evaluations.records() == {'calm'}
     evaluations.open()
     said, _ = (second := evaluations.start()).communicate()
@@ -142,7 +123,8 @@ def test_killed_evaluation_goes_on_where_it_was(evaluations, engine):
 @ENGINES
 @pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM, signal.SIGHUP],
                          ids=lambda number: number.name)
-def test_ended_evaluation_keeps_what_was_finished_and_says_so(evaluations, number, engine):
+def test_ended_evaluation_keeps_what_was_finished_and_says_so(
+        evaluations, number, engine, until, is_alive):
     first = evaluations.start('--engine', engine)
     workers = evaluations.waiting()
     until(lambda: evaluations.records() == {'calm'})
@@ -151,7 +133,7 @@ def test_ended_evaluation_keeps_what_was_finished_and_says_so(evaluations, numbe
     assert first.returncode == 128 + number and 'Traceback' not in said
     assert f'1 of 2 results are kept in {evaluations.output}' in ' '.join(said.split())
     assert 'the same command goes on from there' in ' '.join(said.split())
-    until(lambda: not any(map(lives, workers)))
+    until(lambda: not any(map(is_alive, workers)))
     assert evaluations.records() == {'calm'}
     evaluations.open()
     said, _ = (second := evaluations.start()).communicate()

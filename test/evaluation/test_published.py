@@ -16,10 +16,7 @@
 
 import numpy as np
 import pytest
-import typer
-from typer.testing import CliRunner
 
-from lmsco_ros.cli import evaluate, results
 from lmsco_ros.evaluation.errors import DatasetError, RequestError
 from lmsco_ros.evaluation.published import (
     published_note, PublishedFile, read_published, summarize_published)
@@ -32,15 +29,6 @@ ECO-TIR,.7,.9,.5,.1
 
 Nobody,.4,,,.4
 """
-
-
-@pytest.fixture
-def lmsco():
-    """Return a function that runs the commands of evaluations."""
-    app = typer.Typer()
-    evaluate.register(app)
-    results.register(app)
-    return lambda *words: CliRunner().invoke(app, [str(word) for word in words])
 
 
 @pytest.fixture
