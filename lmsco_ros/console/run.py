@@ -16,24 +16,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-import contextlib
+from collections.abc import Sequence
 import os
 import sys
 import threading
 
 import rclpy
-from rclpy.exceptions import NameValidationException, ParameterException
-from rclpy.impl.implementation_singleton import rclpy_implementation
 
 from lmsco_ros.console.console_node import ConsoleNode
 from lmsco_ros.console.server import serving
 from lmsco_ros.console.settings import TOKEN_VARIABLE
 from lmsco_ros.extras import MissingExtraError
-from lmsco_ros.node import parameter_files
 from lmsco_ros.node.faults import Faults
-from lmsco_ros.node.ros_arguments import explained, StartError
-from lmsco_ros.node.run import in_ros, spin_until
+from lmsco_ros.node.ros_arguments import StartError
+from lmsco_ros.node.run import in_ros, living, spin_until
 
 _PAGE = 'docs/console.md'
 
@@ -47,33 +43,12 @@ def run(arguments: Sequence[str], ending: threading.Event) -> int:
     Parameters and exit code are those of :func:`lmsco_ros.node.run.run`.
     """
     try:
-        with in_ros(arguments), _node(arguments) as node, serving(
+        with in_ros(arguments), living(ConsoleNode, arguments, _PAGE) as node, serving(
                 node.desk, node.settings, os.environ.get(TOKEN_VARIABLE, '')) as address:
             node.get_logger().info(f'the page is at {address}')
             node.get_logger().info(f'waiting for images on {node.desk.image_topic}')
             spin_until(ending, node, Faults(node.get_logger, lambda text: None, rclpy.ok).note)
             return 0
-    except StartError as error:
+    except (MissingExtraError, StartError) as error:
         print(f'console: {error}', file=sys.stderr)
         return 1
-
-
-@contextlib.contextmanager
-def _node(arguments: Sequence[str]) -> Iterator[ConsoleNode]:
-    """Make the node, say what of the parameters it does not hear, and take it down."""
-    try:
-        node = ConsoleNode()
-    except (ParameterException, NameValidationException,
-            rclpy_implementation.RCLError) as error:
-        raise StartError(f'{explained(str(error))}; {_PAGE} lists the parameters with their '
-                         'types') from error
-    except MissingExtraError as error:
-        raise StartError(str(error)) from error
-    try:
-        for warning in [
-                *parameter_files.unheard(arguments, node.get_fully_qualified_name()),
-                *parameter_files.unknown(node._parameter_overrides, node._parameters, _PAGE)]:
-            node.get_logger().warning(warning)
-        yield node
-    finally:
-        node.destroy_node()

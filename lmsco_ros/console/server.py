@@ -28,12 +28,12 @@ from lmsco_ros.console.desk import Desk
 from lmsco_ros.console.requests import MOST_BYTES
 from lmsco_ros.console.settings import ConsoleSettings
 from lmsco_ros.console.web import make_app
-from lmsco_ros.node.ros_arguments import StartError
+from lmsco_ros.node.ros_arguments import shortened, StartError
 
 _MOST_OPEN = 128
 _END_SECONDS = 1
 _BACKLOG = 64
-_EVERY_ADDRESS = ('0.0.0.0', '::')
+_EVERY_ADDRESS = ('', '0.0.0.0', '::')
 
 
 @contextlib.contextmanager
@@ -88,6 +88,8 @@ def _listening(host: str, port: int) -> socket.socket:
     try:
         family = socket.AF_INET6 if ':' in host else socket.AF_INET
         return socket.create_server((host, port), family=family, backlog=_BACKLOG)
-    except (OSError, OverflowError) as error:
-        raise StartError(f'cannot listen on {host}, port {port}: {error}; choose another one with '
-                         '-p host:=... and -p port:=..., 0 takes any port that is free') from error
+    # Of a name that cannot be encoded Python says that it has a wrong type.
+    except (OSError, OverflowError, TypeError) as error:
+        raise StartError(f'cannot listen on {shortened(host)}, port {port}: {error}; choose '
+                         'another one with -p host:=... and -p port:=..., 0 takes any port that '
+                         'is free') from error

@@ -17,12 +17,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+import re
 from urllib.parse import urlsplit
 
-from lmsco_ros.node.ros_arguments import StartError
+from lmsco_ros.node.ros_arguments import shortened, StartError
 
 TOKEN_VARIABLE = 'LMSCO_CONSOLE_TOKEN'
 """Of the environment, not of ROS: everybody on the graph may read parameters."""
+_NODE_NAME = re.compile(r'/?[A-Za-z_]\w*(/[A-Za-z_]\w*)*', re.ASCII)
 _TRANSPORTS = ('raw', 'compressed')
 
 
@@ -66,6 +68,9 @@ class ConsoleSettings:
 
     def __post_init__(self) -> None:
         """Refuse what would be ignored later."""
+        if not _NODE_NAME.fullmatch(self.tracker):
+            raise StartError(f'tracker is {shortened(repr(self.tracker))}; expected the name of a '
+                             'node, such as lmsco_tracker or /robot/lmsco_tracker')
         if self.image_transport not in _TRANSPORTS:
             raise StartError(f'image_transport is {self.image_transport!r}; expected '
                              f'{" or ".join(_TRANSPORTS)}')

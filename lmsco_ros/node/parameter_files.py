@@ -30,7 +30,8 @@ import yaml
 from lmsco_ros.node.ros_arguments import shortened, values_of
 
 _PARAMETERS = 'ros__parameters'
-_EXPECTED = 'expected the layout of config/tracker.yaml'
+TRACKER_FILE = 'config/tracker.yaml'
+_EXPECTED = f'expected the layout of {TRACKER_FILE}'
 
 
 def file_problem(path: str, reason: str) -> str:
@@ -84,8 +85,7 @@ def unheard(arguments: Sequence[str], node: str) -> list[str]:
     return warnings
 
 
-def unknown(given: Iterable[str], known: Iterable[str],
-            listed_in: str = 'config/tracker.yaml') -> list[str]:
+def unknown(given: Iterable[str], known: Iterable[str], listed_in: str) -> list[str]:
     """
     Say which parameters do not exist, each with the nearest name that does.
 

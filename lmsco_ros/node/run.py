@@ -21,6 +21,7 @@ import contextlib
 import gc
 import sys
 import threading
+from typing import TypeVar
 
 import rclpy
 from rclpy.exceptions import NameValidationException, ParameterException
@@ -35,6 +36,7 @@ from lmsco_ros.node.ros_arguments import (check_remappings, explained, shortened
                                           values_of)
 from lmsco_ros.node.tracker_node import TrackerNode
 
+Made = TypeVar('Made', bound=Node)
 # The end of the process is noticed after this time at the latest.
 _LOOK_PERIOD = 0.1
 
@@ -57,7 +59,8 @@ def run(arguments: Sequence[str], ending: threading.Event) -> int:
 
     """
     try:
-        with in_ros(arguments), _node(arguments) as node:
+        with in_ros(arguments), living(
+                TrackerNode, arguments, parameter_files.TRACKER_FILE) as node:
             return _spin(node, ending)
     except StartError as error:
         print(f'tracker_node: {error}', file=sys.stderr)
@@ -97,19 +100,36 @@ def _refusal(reason: str, arguments: Sequence[str]) -> str:
 
 
 @contextlib.contextmanager
-def _node(arguments: Sequence[str]) -> Iterator[TrackerNode]:
-    """Make the node, say what of the parameters it does not hear, and take it down."""
+def living(make: Callable[[], Made], arguments: Sequence[str], listed_in: str) -> Iterator[Made]:
+    """
+    Make a node, say what of the parameters it does not hear, and take it down.
+
+    Parameters
+    ----------
+    make : callable
+        Returns the node.
+    arguments : sequence of str
+        Those for ROS.
+    listed_in : str
+        Where a user finds all parameters.
+
+    Raises
+    ------
+    StartError
+        When the node cannot be made with what it was given.
+
+    """
     try:
-        node = TrackerNode()
+        node = make()
     except ParameterException as error:
-        raise StartError(f'{explained(str(error))}; config/tracker.yaml lists all parameters with '
-                         'their types and ranges') from error
+        raise StartError(f'{explained(str(error))}; {listed_in} lists all parameters with their '
+                         'types') from error
     except (NameValidationException, rclpy_implementation.RCLError) as error:
         raise StartError(explained(str(error))) from error
     try:
         for warning in [
                 *parameter_files.unheard(arguments, node.get_fully_qualified_name()),
-                *parameter_files.unknown(node._parameter_overrides, node._parameters)]:
+                *parameter_files.unknown(node._parameter_overrides, node._parameters, listed_in)]:
             node.get_logger().warning(warning)
         yield node
     finally:

@@ -26,7 +26,7 @@ from rcl_interfaces.msg import SetParametersResult
 from rcl_interfaces.srv import SetParameters, SetParametersAtomically
 from rclpy.parameter import Parameter
 
-from lmsco_ros.node.parameter_files import unknown
+from lmsco_ros.node.parameter_files import TRACKER_FILE, unknown
 
 Answer = Callable[[Any, Any], Any]
 Known = Callable[[], Collection[str]]
@@ -119,5 +119,5 @@ def _objection(parameters: Iterable[ParameterMessage], names: Collection[str]) -
             return (f'{parameter.name}: {parameter.value.type} is no type of a value; expected '
                     f'{min(types)} to {max(types)}, see rcl_interfaces/msg/ParameterType')
         if parameter.name not in names:
-            return unknown([parameter.name], names)[0]
+            return unknown([parameter.name], names, TRACKER_FILE)[0]
     return ''

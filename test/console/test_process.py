@@ -98,6 +98,8 @@ def test_console_ends_on_a_signal_while_a_page_is_open(run, stop):
     (['--ros-args', '-p', 'host:=0.0.0.0'], 1, 'LMSCO_CONSOLE_TOKEN'),
     (['--ros-args', '-p', 'port:=eighty'], 1, 'docs/console.md'),
     (['--ros-args', '-p', 'port:=100000'], 1, 'cannot listen'),
+    (['--ros-args', '-p', 'tracker:=two words'], 1, 'expected the name of a node'),
+    (['--ros-args', '-p', 'tracker:=""'], 1, 'expected the name of a node'),
     (['--ros-args', '-p', 'image_transport:=theora'], 1, 'raw or compressed'),
     (['--ros-args', '-p', 'history_megabytes:=-1.0'], 1, '0 or more'),
     (['--ros-args', '-p', 'history_megabytes:=.nan'], 1, '0 or more'),

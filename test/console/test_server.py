@@ -138,6 +138,13 @@ def test_port_that_is_taken_is_told(address, desk):
         pass
 
 
+@pytest.mark.parametrize('host', ['a..b', 'ä' * 80, 'a\0b', '\ud800', '1.2.3.4.5', '::1%none'])
+def test_address_that_is_none_is_told(desk, host):
+    with pytest.raises(StartError, match='cannot listen on .*host:='), \
+            serving(desk, ConsoleSettings(host=host, port=0), 'a long enough token'):
+        pass
+
+
 @pytest.mark.parametrize('host, token, reason', [
     ('0.0.0.0', '', 'LMSCO_CONSOLE_TOKEN'), ('::', '', 'LMSCO_CONSOLE_TOKEN'),
     ('robot', '', 'LMSCO_CONSOLE_TOKEN'), ('127.0.0.1', 'short', '16')])
