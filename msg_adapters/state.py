@@ -34,6 +34,9 @@ from std_msgs.msg import Header
 from msg_adapters.errors import StateMessageError
 
 _PREFIX = 'target_'
+# Of the largest number that messages have for a target.
+_MOST_DIGITS = 10
+_SHOWN_LETTERS = 80
 # Variance of what an image does not tell (depth, orientation): whoever takes it in learns nothing.
 UNKNOWN = 1e9
 
@@ -88,11 +91,7 @@ def odometry_from_state(state: State, header: Header | None = None) -> Odometry:
     variance `UNKNOWN`.
 
     """
-    numbers = [*state.center, *state.velocity, *np.ravel(state.covariance),
-               *np.ravel(state.velocity_covariance)]
-    if not np.isfinite(numbers).all():
-        raise StateMessageError(f'the state of target {state.track_id} has a number that is not '
-                                'finite; expected finite pixels and pixels per second')
+    _check_finite(state)
     message = Odometry(header=header or Header(), child_frame_id=f'{_PREFIX}{state.track_id}')
     message.pose.pose.position = Point(x=float(state.center[0]), y=float(state.center[1]))
     message.pose.pose.orientation = Quaternion(w=1.0)
@@ -109,16 +108,29 @@ def state_from_odometry(message: Odometry) -> State:
     Raises
     ------
     StateMessageError
-        When the child frame is not that of a target.
+        When the child frame is not that of a target, or a number is not finite.
 
     """
-    number = message.child_frame_id.removeprefix(_PREFIX)
-    if number == message.child_frame_id or not (number.isascii() and number.isdigit()):
-        raise StateMessageError(f'the child frame "{message.child_frame_id}" is not that of a '
+    frame = message.child_frame_id
+    number = frame.removeprefix(_PREFIX)
+    if number == frame or not (number.isascii() and number.isdigit()) \
+            or len(number) > _MOST_DIGITS:
+        raise StateMessageError(f'the child frame "{frame[:_SHOWN_LETTERS]}" is not that of a '
                                 f'target; expected {_PREFIX}1 or another number')
     place, speed = message.pose.pose.position, message.twist.twist.linear
-    return State(int(number), (place.x, place.y), _of_plane(message.pose.covariance),
-                 (speed.x, speed.y), _of_plane(message.twist.covariance))
+    state = State(int(number), (place.x, place.y), _of_plane(message.pose.covariance),
+                  (speed.x, speed.y), _of_plane(message.twist.covariance))
+    _check_finite(state)
+    return state
+
+
+def _check_finite(state: State) -> None:
+    """Raise StateMessageError where a number is not finite."""
+    numbers = [*state.center, *state.velocity, *np.ravel(state.covariance),
+               *np.ravel(state.velocity_covariance)]
+    if not np.isfinite(numbers).all():
+        raise StateMessageError(f'the state of target {state.track_id} has a number that is not '
+                                'finite; expected finite pixels and pixels per second')
 
 
 def _in_plane(covariance: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:

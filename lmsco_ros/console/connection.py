@@ -17,6 +17,7 @@
 from __future__ import annotations
 
 import asyncio
+from collections.abc import AsyncIterator
 import contextlib
 import time
 
@@ -30,6 +31,7 @@ from lmsco_ros.console.requests import (
     Absent, Command, Enable, Next, parse_request, Point, Record, RequestError, Reset, Select,
     Start, Step, Unmark)
 from lmsco_ros.core.errors import LMSCOError
+from lmsco_ros.node.faults import cause
 
 _ANSWER_SECONDS = 5.0
 # More than a person gives, and less than would hinder the tracker.
@@ -99,7 +101,7 @@ class Connection:
 
     async def _answer(self, text: str) -> None:
         """Do what a message asks for."""
-        try:
+        async with self._telling():
             request = parse_request(text)
             if isinstance(request, Next):
                 self._note_drawn(request.drawn)
@@ -112,8 +114,18 @@ class Connection:
             else:
                 self._check(request)
                 await self._do(request)
+
+    @contextlib.asynccontextmanager
+    async def _telling(self) -> AsyncIterator[None]:
+        """Tell the page what cannot be done, whatever the reason; it costs that and no more."""
+        try:
+            yield
+        except WebSocketDisconnect:
+            raise
         except (LMSCOError, RequestError) as error:
             await self._send(replies.answer(False, str(error)))
+        except Exception as error:  # noqa: B902
+            await self._send(replies.answer(False, f'the console cannot do that: {cause(error)}'))
 
     def _note_drawn(self, number: int) -> None:
         if self._last is not None and number == self._last.number:
@@ -190,14 +202,12 @@ class Connection:
 
     async def _send_next(self) -> bool:
         """Send the next frame; tell whether there was one that can be shown."""
-        try:
+        async with self._telling():
             moment = await self._frames.after(0 if self._last is None else self._last.number)
             if moment is not None:
                 await self._show(moment, 'next')
-            return moment is not None
-        except (LMSCOError, RequestError) as error:
-            await self._send(replies.answer(False, str(error)))
-            return False
+                return True
+        return False
 
     async def _show(self, moment: Moment, asked: str) -> None:
         # A frame that cannot be shown is not tried again.

@@ -77,6 +77,25 @@ def test_expected_place_is_told_with_its_ellipse(page, feed, moment, read_frame)
     assert read_frame(page.receive_bytes())[0]['targets'][0]['expected'] is None
 
 
+@pytest.mark.parametrize('asked', [{'type': 'next', 'drawn': 0},
+                                   {'type': 'step', 'number': 5, 'by': 0}])
+def test_a_fault_costs_the_frame_that_it_is_in(
+        page, desk, feed, moment, read_frame, monkeypatch, asked):
+    def broken(*arguments):
+        raise ZeroDivisionError('no side')
+    feed.add(moment(5))
+    with monkeypatch.context() as patch:
+        patch.setattr(desk.pictures, 'jpeg', broken)
+        page.send_json(asked)
+        told = page.receive_json()
+    assert told['type'] == 'answer' and not told['done'] and 'no side (test_web' in told['text']
+    feed.add(moment(6))
+    page.send_json({'type': 'next', 'drawn': 0})
+    while 'bytes' not in (message := page.receive()):
+        pass
+    assert read_frame(message['bytes'])[0]['number'] == 6
+
+
 def test_a_page_that_asks_late_gets_the_newest_frame(page, feed, moment, read_frame):
     for number in range(1, 30):
         feed.add(moment(number))

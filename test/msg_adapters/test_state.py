@@ -66,7 +66,23 @@ def test_numbers_that_are_not_finite_are_refused(place, wrong):
         odometry_from_state(State(**values))
 
 
-@pytest.mark.parametrize('frame', ['', 'target_', 'target_x', 'base_link', '7', 'target_²'])
+@pytest.mark.parametrize('wrong', [float('nan'), float('inf')])
+@pytest.mark.parametrize('spoil', [
+    lambda message, wrong: setattr(message.pose.pose.position, 'y', wrong),
+    lambda message, wrong: setattr(message.twist.twist.linear, 'x', wrong),
+    lambda message, wrong: message.pose.covariance.__setitem__(1, wrong),
+    lambda message, wrong: message.twist.covariance.__setitem__(7, wrong)],
+    ids=['center', 'velocity', 'covariance', 'velocity_covariance'])
+def test_odometry_with_numbers_that_are_not_finite_is_refused(spoil, wrong):
+    message = odometry_from_state(STATE)
+    spoil(message, wrong)
+    with pytest.raises(StateMessageError, match='target 7 has a number that is not finite'):
+        state_from_odometry(message)
+
+
+@pytest.mark.parametrize('frame', [
+    '', 'target_', 'target_x', 'base_link', '7', 'target_²', 'target_' + '9' * 5000])
 def test_odometry_of_something_else_is_refused(frame):
-    with pytest.raises(StateMessageError, match='not that of a target; expected target_1'):
+    with pytest.raises(StateMessageError, match='not that of a target; expected target_1') as told:
         state_from_odometry(Odometry(child_frame_id=frame))
+    assert len(str(told.value)) < 200
