@@ -24,6 +24,18 @@ from launch_ros.actions import Node
 from launch_ros.parameter_descriptions import ParameterValue
 
 HERE = Path(__file__).resolve().parent
+# Of the console: type, default and meaning. Text stays text, as a folder may be called 2026-11-27.
+PARAMETERS = {
+    'host': (str, '127.0.0.1',
+             'Where the page is offered; others need LMSCO_CONSOLE_TOKEN to be set'),
+    'port': (int, '8080', 'Port of the page'),
+    'read_only': (bool, 'false', 'Whether pages may only look'),
+    'image_transport': (str, 'raw',
+                        "raw or compressed images; the tracker's own is in its params_file"),
+    'allowed_origins': (str, '', 'Origins of pages behind a reverse proxy, separated by commas'),
+    'record_folder': (str, '', 'Folder for the bags that pages have recorded; empty: they cannot'),
+    'history_megabytes': (float, '64.0', 'Images that are kept for stepping back'),
+}
 
 
 def generate_launch_description() -> LaunchDescription:
@@ -35,25 +47,8 @@ def generate_launch_description() -> LaunchDescription:
         DeclareLaunchArgument(
             'namespace', default_value='',
             description='Namespace of both nodes and their topics'),
-        DeclareLaunchArgument(
-            'host', default_value='127.0.0.1',
-            description='Where the page is offered; others need LMSCO_CONSOLE_TOKEN to be set'),
-        DeclareLaunchArgument(
-            'port', default_value='8080', description='Port of the page'),
-        DeclareLaunchArgument(
-            'read_only', default_value='false', description='Whether pages may only look'),
-        DeclareLaunchArgument(
-            'image_transport', default_value='raw', choices=['raw', 'compressed'],
-            description="What the page shows; the tracker's own is in its params_file"),
-        DeclareLaunchArgument(
-            'allowed_origins', default_value='',
-            description='Origins of pages behind a reverse proxy, separated by commas'),
-        DeclareLaunchArgument(
-            'record_folder', default_value='',
-            description='Folder for the bags that pages have recorded; empty: they cannot'),
-        DeclareLaunchArgument(
-            'history_megabytes', default_value='64.0',
-            description='Images that are kept for stepping back'),
+        *(DeclareLaunchArgument(name, default_value=default, description=meaning)
+          for name, (_, default, meaning) in PARAMETERS.items()),
         # It takes `image_topic` and `namespace` from here, and its own arguments as well.
         IncludeLaunchDescription(PythonLaunchDescriptionSource(
             str(HERE / 'tracker.launch.py'))),
@@ -62,20 +57,9 @@ def generate_launch_description() -> LaunchDescription:
             executable='console',
             namespace=LaunchConfiguration('namespace'),
             name='lmsco_console',
-            parameters=[{
-                'host': _given('host', str),
-                'port': _given('port', int),
-                'read_only': _given('read_only', bool),
-                'image_transport': _given('image_transport', str),
-                'allowed_origins': _given('allowed_origins', str),
-                'record_folder': _given('record_folder', str),
-                'history_megabytes': _given('history_megabytes', float)}],
+            parameters=[{name: ParameterValue(LaunchConfiguration(name), value_type=kind)
+                         for name, (kind, _, _) in PARAMETERS.items()}],
             remappings=[('image_raw', LaunchConfiguration('image_topic'))],
             output='screen',
         ),
     ])
-
-
-def _given(name: str, kind: type) -> ParameterValue:
-    """Return an argument as a parameter of that type: a folder may be called `2026-11-27`."""
-    return ParameterValue(LaunchConfiguration(name), value_type=kind)
