@@ -103,13 +103,19 @@ class TrackerProcesses(WorkerPlugin):
 
     def _take(self) -> WorkerProcess:
         with self._lock:
-            if self._idle:
-                process, timer = self._idle.pop()
-                timer.cancel()
-            else:
-                process = WorkerProcess()
+            process = self._take_idle() or WorkerProcess()
             self._busy.add(process)
         return process
+
+    def _take_idle(self) -> WorkerProcess | None:
+        """Return a process that waits; one that somebody ended meanwhile is put away."""
+        while self._idle:
+            process, timer = self._idle.pop()
+            timer.cancel()
+            if process.waits:
+                return process
+            process.stop()
+        return None
 
     def _put_back(self, process: WorkerProcess) -> None:
         with self._lock:
@@ -139,7 +145,7 @@ def evaluate(number: int, job: Job, expected: tuple[str, str], name: str) -> Out
         tell anything after it.
     job : Job
         What is to be done.
-    expected : str
+    expected : tuple of str
         Identity of the code where the job comes from.
     name : str
         Of the `TrackerProcesses` of that run.

@@ -98,6 +98,11 @@ class WorkerProcess:
         """Whether the process can be given another job."""
         return self._process.returncode is None
 
+    @property
+    def waits(self) -> bool:
+        """Whether the process, which has no job, can take one: what died has hung up."""
+        return self.lives and not self.connection.poll()
+
     def kill(self) -> None:
         """End the process whatever it does, and all that it started; wait for nothing."""
         if self.lives:

@@ -214,6 +214,17 @@ def test_processes_are_kept_from_job_to_job_and_end_when_nobody_comes(
     assert not processes._idle and processes.answer(jobs[0]).error is None
 
 
+def test_an_idle_process_that_somebody_ends_costs_no_job(plan, processes, until):
+    """As a machine does that runs out of memory."""
+    one, two = plan(one=[TRACK] * 3, two=[TRACK] * 3).pending
+    processes.answer(one)
+    ((process, _),) = processes._idle
+    os.kill(process._process.pid, signal.SIGKILL)
+    until(lambda: not process.waits)
+    assert processes.answer(two).error is None
+    assert process._process.returncode == -signal.SIGKILL
+
+
 def test_a_worker_that_closes_records_no_crash(plan, processes, waiting, until, is_alive):
     (job,) = plan(waits=[TRACK, WAIT]).pending
     with ThreadPoolExecutor() as pool:
