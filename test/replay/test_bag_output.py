@@ -121,6 +121,11 @@ def test_place_that_was_taken_meanwhile(tmp_path, output):
     assert (tmp_path / 'bag' / 'precious').exists()
 
 
+def test_place_with_too_long_a_name(tmp_path, storage):
+    with pytest.raises(OutputError, match='created .File name too long.; choose a place'):
+        BagOutput(tmp_path / ('x' * 300), storage)
+
+
 def test_place_that_cannot_be_written_to(tmp_path, storage):
     (tmp_path / 'file').write_text('')
     with pytest.raises(OutputError, match='cannot be created'):

@@ -80,8 +80,11 @@ class BagOutput:
         if storage is Storage.SQLITE3 and set(str(path)) & set('?#%'):
             raise OutputError(f'{path} cannot be written: rosbags writes no database into a place '
                               'with ?, # or % in its name; choose another name, or mcap')
-        self._writer = Writer(self._partial / path.name, version=9,
-                              storage_plugin=_PLUGINS[storage])
+        try:
+            self._writer = Writer(self._partial / path.name, version=9,
+                                  storage_plugin=_PLUGINS[storage])
+        except OSError as error:
+            raise self._no_place(error) from error
 
     def __enter__(self) -> BagOutput:
         """Open the bag."""
