@@ -207,8 +207,8 @@ def tracked_from_detections(array: Any) -> list[Tracked]:
     """
     Return the boxes of a `vision_msgs/Detection2DArray`; rotations are ignored.
 
-    Of several hypotheses the one with the highest score counts; without any the class is empty
-    and the score 1.
+    Of several hypotheses the one with the highest score counts, one without a number as its score
+    last; without any the class is empty and the score 1.
 
     Raises
     ------
@@ -223,7 +223,8 @@ def _tracked(detection: Any) -> Tracked:
     """Return one detection."""
     place, box = detection.bbox.center.position, detection.bbox
     best = max((result.hypothesis for result in detection.results),
-               key=lambda hypothesis: hypothesis.score, default=None)
+               key=lambda hypothesis: -math.inf if math.isnan(hypothesis.score)
+               else hypothesis.score, default=None)
     return Tracked(
         checked_box((place.x - box.size_x / 2, place.y - box.size_y / 2, box.size_x, box.size_y)),
         detection.id, *(1.0, '') if best is None else (float(best.score), str(best.class_id)))

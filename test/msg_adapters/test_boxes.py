@@ -193,6 +193,15 @@ def test_best_hypothesis_of_a_detection_counts(vision_msgs):
     assert [found[2:] for found in tracked_from_detections(array)] == [(0.6, 'dog'), (1.0, '')]
 
 
+def test_hypothesis_without_a_score_hides_no_other(vision_msgs):
+    array = detections_from_boxes(
+        [Tracked((1, 2, 3, 4), '7', score, kind)
+         for score, kind in ((math.nan, 'cat'), (0.3, 'dog'), (math.nan, 'bat'))])
+    found = array.detections[0]
+    found.results = [each.results[0] for each in array.detections]
+    assert tracked_from_detections(array)[0][2:] == (0.3, 'dog')
+
+
 @pytest.mark.parametrize('size', [0.0, -1.0, float('nan'), float('inf')])
 def test_detection_without_an_area_is_refused(vision_msgs, size):
     array = detections_from_boxes([Tracked((1, 2, 3, 4))])
