@@ -20,10 +20,6 @@ import sys
 import cv2
 import numpy as np
 import pytest
-import typer
-from typer.testing import CliRunner
-
-from lmsco_ros.cli import evaluate, results
 
 SIZE = (64, 48)
 WALK_SIZE = (160, 120)
@@ -212,6 +208,11 @@ def is_alive():
 @pytest.fixture
 def lmsco():
     """Return a function that runs the commands of evaluations."""
+    import typer
+    from typer.testing import CliRunner
+
+    from lmsco_ros.cli import evaluate, results
+
     app = typer.Typer()
     evaluate.register(app)
     results.register(app)
