@@ -37,8 +37,9 @@ _ELSEWHERE, _AGREEING = 2.5, 2.0
 # Frames after a target was found again in which a single doubt is enough to give it up.
 _PROBATION = 5
 
-# Belief that is enough for a jump, and to find again what has hardly moved.
-_LIKELY = 0.5
+# Belief that is enough for a jump, and to find again what has hardly moved; and that with which
+# what was seen a frame before is found elsewhere at once.
+_LIKELY, _OVERWHELMING = 0.5, 0.85
 # Score of the first frame from which the target stands out there: all 88 of the train part do, and
 # two of as many pieces of empty ground.
 _STANDING_OUT = 0.6
@@ -89,8 +90,7 @@ class PresenceMonitor:
     @property
     def hurried(self) -> bool:
         """Whether the target was seen, or the view has changed, so shortly ago that it hurries."""
-        recent = self.config.lost_frames
-        return self._misses < recent or self._cut > _CUT_FRAMES - recent
+        return self._misses < self.config.lost_frames or self._just_cut
 
     def start(self, evidence: Evidence) -> Verdict:
         """
@@ -134,7 +134,7 @@ class PresenceMonitor:
         Filter, first filter and extent network must agree, each of them; less so after a cut.
         """
         found, part = _AFTER_CUT[:2] if self.after_cut else (1.0, 1.0)
-        return (seen.score >= min(self.config.found, found)
+        return (self._likely(seen) >= min(self.config.found, found)
                 and seen.quality >= part * self.config.sharp
                 and seen.likeness >= part * self.config.alike
                 and (seen.evidence.presence is None or self.present(seen.evidence.presence)))
@@ -157,18 +157,20 @@ class PresenceMonitor:
         """
         Decide on a frame: what is told of it, and whether the track follows and learns.
 
-        Where the target has to be found again, two frames that agree are believed; and the first
-        doubt thereafter gives it up. After a cut it is lost until then: its place is of a view
-        that is no more.
+        Where the target has to be found again, two frames that agree are believed, or one that
+        is overwhelming; and the first doubt thereafter gives it up. After a cut it is lost until
+        then: its place is of a view that is no more.
         """
         found = not self._misses_target(seen)
         agreed, promising = found and self._promised, False
         if found and not agreed and self._needs_another(seen):
             found, promising = False, True
         given_up = not found and self._probation > 0
+        elsewhere = found and (agreed or seen.evidence.jump > _ELSEWHERE)
         self._misses = 0 if found else self._misses + 1
         self._cut = 0 if found else max(0, self._cut - 1)
-        self._probation = _PROBATION if agreed else max(0, self._probation - 1) if found else 0
+        self._probation = (_PROBATION if elsewhere
+                           else max(0, self._probation - 1) if found else 0)
         self._promised = promising
         if found:
             self._expectation.learn(seen.evidence.sharpness)
@@ -196,9 +198,29 @@ class PresenceMonitor:
                 or self._doubtful and seen.score < _NOTHING)
 
     def _needs_another(self, seen: Assessment) -> bool:
-        """Return whether another frame has to agree: not with what stayed through a cut."""
+        """
+        Return whether another frame has to agree.
+
+        Not with what stayed through a cut, nor where all speaks for what was just seen.
+        """
+        if self._state is TrackState.LOST:
+            return True
         farthest = JUMP if self.after_cut else _ELSEWHERE
-        return self._state is TrackState.LOST or seen.evidence.jump > farthest
+        overwhelming = self._likely(seen) >= _OVERWHELMING and self.convincing(seen)
+        return seen.evidence.jump > farthest and not overwhelming
+
+    @property
+    def _just_cut(self) -> bool:
+        """Whether the view has changed in one of the last frames."""
+        return self._cut > _CUT_FRAMES - self.config.lost_frames
+
+    def _likely(self, seen: Assessment) -> float:
+        """
+        Return how probable it is that something elsewhere is the target.
+
+        Shortly after a cut a part of it is enough: hardly anything else will be that.
+        """
+        return seen.belief if self._just_cut and not self._doubtful else seen.score
 
     def _note(self) -> str:
         """Return what is told of a start that nothing has stood out from since."""

@@ -414,10 +414,34 @@ def test_what_the_next_frame_does_not_see_there_is_not_believed(lost, other):
 
 
 def test_target_out_of_its_region_needs_two_frames_and_one_within_it_one(monitor):
-    assert judge(monitor, replace(CLEAR, jump=2.5)).believed
-    far = judge(monitor, replace(CLEAR, jump=2.6))
+    likely = at_score(monitor, 0.82)
+    assert judge(monitor, replace(likely, jump=2.5)).believed
+    far = judge(monitor, replace(likely, jump=2.6))
     assert far.promising and not far.believed and far.state is TrackState.UNCERTAIN
     assert judge(monitor, CLEAR).believed
+
+
+def test_where_all_speaks_for_the_target_out_of_its_region_one_frame_is_enough(monitor):
+    far = replace(at_score(monitor, 0.86), jump=2.6)
+    verdict = judge(monitor, far)
+    assert verdict.believed and verdict.state is TrackState.UNCERTAIN and not verdict.learns
+    assert judge(monitor, GONE).state is TrackState.LOST
+
+
+def test_one_frame_is_never_enough_for_a_lost_target(lost):
+    assert not judge(lost, replace(CLEAR, jump=2.6)).believed
+
+
+def test_part_of_the_target_is_enough_shortly_after_a_cut(monkeypatch, monitor):
+    part = replace(at_score(monitor, 0.86), jump=10.0)
+    unsure = replace(trust_module.MEASURED, constant=trust_module.MEASURED.constant - 3)
+    monkeypatch.setattr(trust_module, 'MEASURED', unsure)
+    assert not convincing(monitor, part)
+    monitor.note_cut()
+    for _ in range(CONFIG.lost_frames):
+        assert convincing(monitor, part)
+        judge(monitor, GONE)
+    assert not convincing(monitor, part)
 
 
 def test_found_again_is_learned_from_after_probation(lost):
