@@ -20,7 +20,6 @@ import math
 
 import numpy as np
 import numpy.typing as npt
-from scipy.linalg import block_diag
 
 from lmsco_ros.core.backend import to_numpy
 from lmsco_ros.core.detection.detector import Detection
@@ -39,8 +38,9 @@ _SIZE_ERROR = 0.02
 
 def box_covariance(detection: Detection, box: BoundingBox) -> npt.NDArray[np.float64]:
     """Return the covariance of center x, center y, width and height of a measured box, in px^2."""
-    center = center_covariance(detection, math.sqrt(box.area))
-    return np.asarray(block_diag(center, *np.square(_SIZE_ERROR * np.array(box.size))))
+    covariance = np.diag([0.0, 0.0, *((_SIZE_ERROR * side)**2 for side in box.size)])
+    covariance[:2, :2] = center_covariance(detection, math.sqrt(box.area))
+    return covariance
 
 
 def center_covariance(detection: Detection, side: float) -> npt.NDArray[np.float64]:

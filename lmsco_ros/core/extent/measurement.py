@@ -16,6 +16,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 import math
 from typing import TYPE_CHECKING
@@ -128,8 +129,7 @@ def _patch(network: ExtentNet, view: FrameView, box: BoundingBox) -> np.ndarray:
     size, side = network.size, network.context * _side(box)
     region = BoundingBox.from_center(box.center, (side, side))
     image = BoundingBox(0, 0, *view.size)
-    return np.stack([view.patch(region, (size, size)), _covered(region, box, size),
-                     _covered(region, image, size)])
+    return np.stack([view.patch(region, (size, size)), *_covered(region, (box, image), size)])
 
 
 def _apart(edges: np.ndarray) -> np.ndarray:
@@ -144,12 +144,12 @@ def _side(box: BoundingBox) -> float:
     return math.sqrt(box.area)
 
 
-def _covered(region: BoundingBox, box: BoundingBox, size: int) -> np.ndarray:
-    """Return how much of each pixel of a patch of a region a box covers, shape (size, size)."""
-    spans = []
-    for start, length, low, high in (
-            (region.y, region.height, box.y, box.y + box.height),
-            (region.x, region.width, box.x, box.x + box.width)):
-        lines = np.clip(np.linspace(start, start + length, size + 1), low, high)
-        spans.append(np.diff(lines) * (size / length))
-    return np.outer(*spans).astype(np.float32)
+def _covered(region: BoundingBox, boxes: Sequence[BoundingBox], size: int) -> np.ndarray:
+    """Return how much of each pixel of a patch of a region boxes cover, shape (n, size, size)."""
+    start, length = np.array([(region.y, region.x), (region.height, region.width)])
+    lines = np.linspace(start, start + length, size + 1)
+    low = np.array([(box.y, box.x) for box in boxes])[:, None]
+    high = np.array([(box.y + box.height, box.x + box.width) for box in boxes])[:, None]
+    inside = np.minimum(np.maximum(lines, low), high)
+    spans = (inside[:, 1:] - inside[:, :-1]) * (size / length)
+    return (spans[:, :, None, 0] * spans[:, None, :, 1]).astype(np.float32)

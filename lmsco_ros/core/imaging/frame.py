@@ -73,7 +73,7 @@ def read_frame(image: np.ndarray) -> Frame:
         values, image = values[:, :, 0], image[:, :, 0]
     _check(values)
     kind = f'{values.shape} {values.dtype.name}'
-    if np.ma.is_masked(image):
+    if isinstance(image, np.ma.MaskedArray) and np.ma.is_masked(image):
         return Frame(_without_masked(values, np.ma.getmaskarray(image)), kind)
     keeps = values.dtype.name in ('uint8', 'uint16')
     return Frame(_converted(values, values.dtype.name if keeps else 'float32'), kind)
