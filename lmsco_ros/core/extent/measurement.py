@@ -134,9 +134,9 @@ def _patch(network: ExtentNet, view: FrameView, box: BoundingBox) -> np.ndarray:
 
 def _apart(edges: np.ndarray) -> np.ndarray:
     """Return edges in their order, and no nearer to each other than can be seen."""
-    middle = edges.mean(axis=1, keepdims=True)
-    half = np.maximum(np.abs(np.diff(edges, axis=1)), _SMALLEST_SIDE) / 2
-    return np.concatenate([middle - half, middle + half], axis=1)
+    near, far = edges[:, :1], edges[:, 1:]
+    half = np.maximum(np.abs(far - near), _SMALLEST_SIDE) / 2
+    return (near + far) / 2 + half * (-1.0, 1.0)
 
 
 def _side(box: BoundingBox) -> float:
@@ -147,7 +147,7 @@ def _side(box: BoundingBox) -> float:
 def _covered(region: BoundingBox, boxes: Sequence[BoundingBox], size: int) -> np.ndarray:
     """Return how much of each pixel of a patch of a region boxes cover, shape (n, size, size)."""
     start, length = np.array([(region.y, region.x), (region.height, region.width)])
-    lines = np.linspace(start, start + length, size + 1)
+    lines = start + np.arange(size + 1)[:, None] * (length / size)
     low = np.array([(box.y, box.x) for box in boxes])[:, None]
     high = np.array([(box.y + box.height, box.x + box.width) for box in boxes])[:, None]
     inside = np.minimum(np.maximum(lines, low), high)
