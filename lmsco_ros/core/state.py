@@ -176,7 +176,7 @@ class TargetState:
         """Covariance of center x, center y, width and height in px^2, shape (4, 4)."""
         width, height = np.exp(self._mean[_SIZE]).tolist()
         pixels = np.array([1.0, 1.0, width, height])
-        covariance = self._covariance[:4, :4] * pixels * pixels[:, None]
+        covariance = self._covariance[:4, :4] * (pixels * pixels[:, None])
         covariance.flat[::5] += (_LASTING * (width, height, width, height))**2
         return covariance
 

@@ -29,7 +29,7 @@ from lmsco_ros.core.fourier.localization import centered_map
 from lmsco_ros.core.imaging.gain import AutomaticGain, FrameSurvey
 from lmsco_ros.core.imaging.regions import check_box, clamp_box, visible_part
 from lmsco_ros.core.imaging.view import FrameView
-from lmsco_ros.core.networks.together import Asking
+from lmsco_ros.core.networks.together import Asking, in_step
 from lmsco_ros.core.presence.evidence import Verdict
 from lmsco_ros.core.presence.monitor import PresenceMonitor
 from lmsco_ros.core.presence.neighbors import Neighbors
@@ -131,8 +131,10 @@ class Track:
             self.course.measure(self._box, box_covariance(sighting.detection, self._box))
         else:
             self.course.missed(sighting.found if verdict.promising else None)
+        yield from in_step()
         if verdict.learns:
             self._learn(sighting)
+        yield from in_step()
         self._detector.watch(view, self.course.expected(view.size))
         self.result = self._describe(view, sighting.detection, verdict)
         return self.result

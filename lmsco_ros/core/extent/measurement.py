@@ -110,12 +110,11 @@ class ExtentMeter:
         return at_once(self.ask(view, box))
 
     def ask(self, view: FrameView, box: BoundingBox) -> Asking[Measurement]:
-        """Return the extent as `__call__` does, and ask the network for the encoding."""
+        """Return the extent as `__call__` does, and ask the network for it."""
         network = self._network
-        encoding = yield Ask(id(network), network.encode_all, _patch(network, view, box))
-        # One by one: in a batch this part gives other bits, which what is measured feeds back.
-        answer = network.relate(
-            self._reference, encoding, (self._first_side, math.log2(_side(box))))
+        answer = yield Ask(id(network), network.answers, (
+            _patch(network, view, box), self._reference,
+            (self._first_side, math.log2(_side(box)))))
         unit = self._network.context * _side(box) / 2
         expected = np.array([[box.x, box.x + box.width], [box.y, box.y + box.height]])
         # The network speaks of left, top, right, bottom, and of Laplace distributions.
