@@ -217,8 +217,8 @@ class ConfiguredTargets:
         """
         Learn from the last frame, where it is time to: what the next `update` would begin with.
 
-        Who passes results on at once, and waits for the next frame then, calls this in between: the
-        results of the next frame are the same, but come earlier.
+        Who passes results on at once, and waits for the next frame then, calls this in between:
+        the results of the next frame are the same, but come earlier.
 
         Raises
         ------

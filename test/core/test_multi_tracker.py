@@ -315,7 +315,8 @@ def test_one_call_at_a_time(scene):
     tracker, image = MultiTracker('hcs'), frame(scene, *paths(0))
     tracker.initialize(image, box_of(paths(0)[0]))
     with tracker._alone():
-        for call in (lambda: tracker.update(image), tracker.reset, tracker.learn, lambda: tracker.drop(1),
+        for call in (lambda: tracker.update(image), tracker.reset, tracker.learn,
+                     lambda: tracker.drop(1),
                      lambda: tracker.initialize(image, box_of(paths(0)[0]))):
             with pytest.raises(BusyError):
                 call()

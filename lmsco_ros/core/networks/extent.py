@@ -31,7 +31,7 @@ _CONTRAST_LIMIT = 6.0
 
 
 Question = tuple[np.ndarray, torch.Tensor, tuple[float, float]]
-"""A patch, shape (3, size, size), float32; what `ExtentNet.reference` makes of the target; sides."""
+"""A patch, shape (3, size, size); what `reference` makes of the target; sides as in `measure`."""
 
 
 class ExtentNet(Backbone):
