@@ -84,6 +84,9 @@ class InstantTracker:
         """Return the box again."""
         return self.results
 
+    def learn(self) -> None:
+        """Do nothing."""
+
     def drop(self, number: int) -> None:
         """Forget the only target."""
         self.reset()

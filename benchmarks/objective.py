@@ -130,6 +130,7 @@ def record_lesson(config: TrackerConfig, clip: Clip) -> Lesson:
     for number, frame in enumerate(clip.frames[1:], start=1):
         known = len(stored)
         tracker.update(frame)
+        tracker.learn()
         if len(stored) > known:
             samples[number] = stored[-1]
     return Lesson(starts[0], samples)

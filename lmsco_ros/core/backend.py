@@ -21,7 +21,8 @@ from importlib import import_module
 import sys
 from typing import Any
 
-from array_api_compat import array_namespace, is_torch_array
+import array_api_compat
+from array_api_compat import is_torch_array
 import array_api_compat.numpy as numpy_namespace
 import cv2
 import numpy as np
@@ -110,6 +111,12 @@ def _backend_of(library: str, device_name: str, dtype: str) -> Backend:
         return select_backend(device_name, dtype)
     import torch
     return Backend(import_module(library), torch.device(device_name), dtype)
+
+
+def array_namespace(values: Array) -> Any:
+    """Return the array API namespace of an array; that of NumPy at once, which is asked most."""
+    return numpy_namespace if type(values) is np.ndarray else array_api_compat.array_namespace(
+        values)
 
 
 def limit_threads(count: int) -> None:

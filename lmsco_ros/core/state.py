@@ -174,10 +174,11 @@ class TargetState:
     @property
     def covariance(self) -> npt.NDArray[np.float64]:
         """Covariance of center x, center y, width and height in px^2, shape (4, 4)."""
-        sizes = np.exp(self._mean[_SIZE])
-        pixels = np.array([1.0, 1.0, *sizes])
-        lasting = np.diag((_LASTING * np.tile(sizes, 2))**2)
-        return self._covariance[:4, :4] * np.outer(pixels, pixels) + lasting
+        width, height = np.exp(self._mean[_SIZE]).tolist()
+        pixels = np.array([1.0, 1.0, width, height])
+        covariance = self._covariance[:4, :4] * (pixels * pixels[:, None])
+        covariance.flat[::5] += (_LASTING * (width, height, width, height))**2
+        return covariance
 
     def predict(self, frames: float) -> None:
         """Let so many frames pass; the covariance grows."""

@@ -163,6 +163,11 @@ class Targets:
                 place for other, place in headings.items() if other != number])
             for number, track in self._tracks.items() if only is None or number in only})
 
+    def learn(self) -> None:
+        """Learn from the last frame what the next one would wait for."""
+        for track in self._tracks.values():
+            track.learn()
+
     def drop(self, number: int) -> None:
         """Forget a target; KeyError when there is none of that number."""
         del self._tracks[number]
@@ -207,6 +212,22 @@ class ConfiguredTargets:
         self._targets = Targets(self.config, backend, load_networks(self.config))
         limit_threads(self.config.runtime.threads)
         self._lock = Lock()
+
+    def learn(self) -> None:
+        """
+        Learn from the last frame, where it is time to: what the next `update` would begin with.
+
+        Who passes results on at once, and waits for the next frame then, calls this in between:
+        the results of the next frame are the same, but come earlier.
+
+        Raises
+        ------
+        BusyError
+            When another thread is at work in this tracker. Nothing changes then.
+
+        """
+        with self._alone():
+            self._targets.learn()
 
     def __getstate__(self) -> dict[str, Any]:
         """Return a copy of everything but the lock, as it is between two calls."""

@@ -29,7 +29,7 @@ from lmsco_ros.core.fourier.localization import centered_map
 from lmsco_ros.core.imaging.gain import AutomaticGain, FrameSurvey
 from lmsco_ros.core.imaging.regions import check_box, clamp_box, visible_part
 from lmsco_ros.core.imaging.view import FrameView
-from lmsco_ros.core.networks.together import Asking
+from lmsco_ros.core.networks.together import Asking, in_step
 from lmsco_ros.core.presence.evidence import Verdict
 from lmsco_ros.core.presence.monitor import PresenceMonitor
 from lmsco_ros.core.presence.neighbors import Neighbors
@@ -72,6 +72,7 @@ class Track:
         check_box(box, (frame.image.shape[1], frame.image.shape[0]))
         self.course, self._config = Course(box, time), config
         self._box, self._frame, self._after_shutter = box, 0, False
+        self._training_due = False
         self._gain = AutomaticGain(config.intensity)
         condition = self._gain.examine(frame)
         view = FrameView(frame.image, condition.intensity)
@@ -92,7 +93,10 @@ class Track:
     def advance(self, frame: FrameSurvey, time: float | None = None,
                 others: Sequence[tuple[float, float]] = ()) -> Asking[TrackResult]:
         """
-        Find the target in the next frame, learn from it if it can be trusted; ask the networks.
+        Find the target in the next frame, asking the networks.
+
+        A frame that can be trusted is remembered; :meth:`learn` learns from it, at the latest when
+        the next frame comes.
 
         Parameters
         ----------
@@ -104,6 +108,8 @@ class Track:
             Where (x, y) other targets go, which are not to be taken for this one.
 
         """
+        self.learn()
+        yield from in_step()
         self.course.next_frame(time)
         condition = self._gain.examine(frame)
         view = FrameView(frame.image, condition.intensity)
@@ -132,10 +138,16 @@ class Track:
         else:
             self.course.missed(sighting.found if verdict.promising else None)
         if verdict.learns:
-            self._learn(sighting)
+            self._remember(sighting)
         self._detector.watch(view, self.course.expected(view.size))
         self.result = self._describe(view, sighting.detection, verdict)
         return self.result
+
+    def learn(self) -> None:
+        """Train the filter if the last frame has made it time to; the next frame would do so."""
+        if self._training_due:
+            self._detector.train()
+            self._training_due = False
 
     def _expect_nothing(self, view: FrameView) -> None:
         """Expect nothing of a view that has changed at once, but that it shows the target."""
@@ -164,12 +176,11 @@ class Track:
         if state is TrackState.TRACKING and self._config.presence.distractors:
             self._observer.keep(view, box)
 
-    def _learn(self, sighting: Sighting) -> None:
-        """Store the sample; when it is time, train the filter."""
+    def _remember(self, sighting: Sighting) -> None:
+        """Store the sample, and see whether it is time to train the filter."""
         place = place_to_learn(sighting.detection.center, self._box, sighting.measurement)
         self._detector.remember(sighting.detection, place)
-        if self._frame % self._config.learning.update_interval == 0:
-            self._detector.train()
+        self._training_due = self._frame % self._config.learning.update_interval == 0
 
     def _describe(self, view: FrameView, detection: Detection, verdict: Verdict) -> TrackResult:
         """Return what there is to say; the target in the first frame scores 1 in the map."""

@@ -138,7 +138,7 @@ class BoundingBox:
 def _finite(numbers: Sequence[float]) -> bool:
     """Return whether these are finite numbers, all of them."""
     try:
-        return all(math.isfinite(number) for number in numbers)
+        return all(map(math.isfinite, numbers))
     except (TypeError, OverflowError):
         return False
 

@@ -118,6 +118,10 @@ class FollowedTargets:
         self._results = self._results | dict(results)
         return results
 
+    def learn(self) -> None:
+        """Learn from the last frame, while nobody waits for an answer."""
+        self._tracker.learn()
+
     def give_up(self, results: Mapping[int, TrackResult], stamp: int) -> tuple[int, ...]:
         """Drop and return those that are lost for too long in a frame of that stamp."""
         for number, result in results.items():

@@ -90,6 +90,11 @@ class FallbackTracker:
         self._note(image, time, results)
         return results
 
+    def learn(self) -> None:
+        """Learn from the last frame what the next `update` would begin with."""
+        if not self._attempt(self._learned):
+            self._resume()
+
     def drop(self, number: int) -> None:
         """Forget a target."""
         self._tracker.drop(self._numbers[number])
@@ -113,6 +118,10 @@ class FallbackTracker:
             self._forget(replaced)
         self._note(image, time, {self._started: self.results[self._started]})
         return self._started
+
+    def _learned(self) -> bool:
+        self._tracker.learn()
+        return True
 
     def _step(self, image: npt.NDArray, time: float,
               only: Collection[int] | None) -> dict[int, TrackResult]:

@@ -53,6 +53,9 @@ class Tracker(Protocol):
                only: Collection[int] | None = None) -> Mapping[int, TrackResult]:
         """Find the targets, or only some of them, in their next frame."""
 
+    def learn(self) -> None:
+        """Learn from the last frame what the next `update` would begin with."""
+
     def drop(self, number: int) -> None:
         """Forget a target."""
 

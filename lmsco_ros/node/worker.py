@@ -244,6 +244,8 @@ class TrackerWorker(Intake):
             self._report(item, Phase.TRACKED if results else Phase.REFUSED,
                          '' if start is None else start.reason, results=results, image=image,
                          started=started, start=start, dropped=dropped)
+            # What this raises, the next frame raises again, and is answered so.
+            self._targets.learn()
 
     def _report(self, item: Item, phase: Phase, error: str = '', *,
                 results: Mapping[int, TrackResult] = MappingProxyType({}),

@@ -26,6 +26,7 @@ from lmsco_ros.core import (
     BoundingBox, BoxError, BusyError, ImageError, LMSCOTracker, MultiTracker, TimeError,
     TrackState, UnknownTargetError)
 from lmsco_ros.core import targets as targets_module
+from lmsco_ros.core.detection.detector import Detector
 
 SIZE = (24.0, 18.0)
 
@@ -172,6 +173,35 @@ def test_unknown_target_is_named_with_those_that_are_known(scene):
         tracker.drop(3)
 
 
+def test_what_is_learned_between_frames_changes_no_result(scene):
+    eager, lazy = MultiTracker(), MultiTracker()
+    for tracker in (eager, lazy):
+        for center in paths(0):
+            tracker.initialize(frame(scene, *paths(0)), box_of(center))
+    for index in range(1, 6):
+        image = frame(scene, *paths(index))
+        said, expected = eager.update(image), lazy.update(image)
+        eager.learn()
+        for number, result in said.items():
+            assert result.box == expected[number].box
+            np.testing.assert_array_equal(result.confidence_map, expected[number].confidence_map)
+
+
+def test_answer_does_not_wait_for_the_training(scene, monkeypatch):
+    trained = []
+    train = Detector.train
+    monkeypatch.setattr(Detector, 'train', lambda self: (trained.append(self), train(self)))
+    tracker = MultiTracker()
+    for center in paths(0):
+        tracker.initialize(frame(scene, *paths(0)), box_of(center))
+    for index in range(1, 5):
+        tracker.update(frame(scene, *paths(index)))
+        before = len(trained)
+        tracker.learn()
+        assert before == len(paths(0)) * ((index - 1) // 2)
+        assert len(trained) == len(paths(0)) * (index // 2)
+
+
 def test_frame_is_measured_once_for_all(scene, monkeypatch):
     measured = []
     survey = targets_module.survey
@@ -285,7 +315,8 @@ def test_one_call_at_a_time(scene):
     tracker, image = MultiTracker('hcs'), frame(scene, *paths(0))
     tracker.initialize(image, box_of(paths(0)[0]))
     with tracker._alone():
-        for call in (lambda: tracker.update(image), tracker.reset, lambda: tracker.drop(1),
+        for call in (lambda: tracker.update(image), tracker.reset, tracker.learn,
+                     lambda: tracker.drop(1),
                      lambda: tracker.initialize(image, box_of(paths(0)[0]))):
             with pytest.raises(BusyError):
                 call()

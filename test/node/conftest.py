@@ -84,6 +84,9 @@ class FakeTracker:
         self.results.update(moved)
         return moved
 
+    def learn(self):
+        pass
+
     def drop(self, number):
         del self.results[number]
 

@@ -99,6 +99,21 @@ def test_start_beside_others_is_repeated_on_the_processor(bench):
     assert {number: result.box.x for number, result in tracker.results.items()} == {1: 9, 2: 1}
 
 
+def test_targets_go_on_after_memory_was_short_in_training(bench, monkeypatch):
+    tracker, fakes, warnings = bench
+    number = tracker.initialize(image(0), BOX, 1.0)
+
+    def learn():
+        raise OutOfMemory
+
+    monkeypatch.setattr(fakes['cuda'], 'learn', learn)
+    tracker.learn()
+    assert len(warnings) == 1 and list(tracker.results) == [number]
+    tracker.learn()
+    tracker.update(image(1), 2.0)
+    assert calls(fakes['cpu']) == [('initialize', 0), ('update', 1)]
+
+
 def test_start_on_a_point_is_repeated_on_the_processor(bench):
     tracker, fakes, _ = bench
     tracker.initialize(image(0), BOX, 1.0)

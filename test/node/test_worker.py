@@ -61,6 +61,7 @@ class Recorder:
 
     def __init__(self):
         self.calls, self.times, self.error = [], [], None
+        self.on_learn = lambda: None
         self.results, self.count, self.state = {}, 0, TrackState.TRACKING
         self.gate = threading.Event()
         self.gate.set()
@@ -80,6 +81,9 @@ class Recorder:
         self._answer('update', image)
         return {number: self._result(result.box) for number, result in self.results.items()
                 if only is None or number in only}
+
+    def learn(self):
+        self.on_learn()
 
     def drop(self, number):
         del self.results[number]
@@ -181,6 +185,32 @@ def test_outcome_tells_frame_times_and_context(bench):
     assert outcome.frame.context == 'context'
     assert outcome.started - outcome.frame.received >= 5
     assert outcome.started <= outcome.finished <= time.monotonic()
+
+
+def test_answer_goes_out_before_it_is_learned_from(bench):
+    b, answered = bench(), []
+    b.tracker.on_learn = lambda: answered.append(len(b.outcomes))
+    b.worker.initialize(BOX)
+    b.frames([0])
+    b.frames([1])
+    b.worker.reset()
+    b.frames([2])
+    b.worker.stop()
+    # Where nothing was tracked there is nothing to learn from.
+    assert answered == [1, 2]
+
+
+def test_failure_to_learn_is_told_and_leaves_the_answers(bench):
+    b = bench()
+    b.worker.initialize(BOX)
+    b.frames([0])
+    b.tracker.on_learn = lambda: 1 / 0
+    b.frames([1])
+    b.tracker.on_learn = lambda: None
+    b.frames([2])
+    assert [outcome.phase for outcome in b.outcomes] == 3 * [Phase.TRACKED]
+    (work, error), = b.faults
+    assert isinstance(error, ZeroDivisionError)
 
 
 def test_latest_drops_what_a_busy_tracker_cannot_take(bench):

@@ -51,6 +51,9 @@ class Follower:
         box = BoundingBox(float(image[0, 0]), 1, 2, 2)
         return {1: TrackResult(box, 0.5, TrackState.TRACKING, np.ones((4, 4), np.float32), box)}
 
+    def learn(self):
+        pass
+
     def reset(self):
         self.results = {}
 

@@ -53,6 +53,9 @@ class Follower:
         state = TrackState.LOST if image[0, 0] == 255 else TrackState.TRACKING
         return {1: self._result(image, BoundingBox(float(image[0, 0]), 6, 10, 12), state)}
 
+    def learn(self):
+        pass
+
     def reset(self):
         self.results = {}
 

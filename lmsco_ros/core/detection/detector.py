@@ -33,7 +33,7 @@ from lmsco_ros.core.imaging.regions import patch_size, region_around
 from lmsco_ros.core.imaging.view import FrameView
 from lmsco_ros.core.learning.memory import score
 from lmsco_ros.core.learning.structured_operator import StructuredOperator
-from lmsco_ros.core.networks.together import Asking, at_once
+from lmsco_ros.core.networks.together import Asking, at_once, in_step
 from lmsco_ros.core.types import BoundingBox
 from lmsco_ros.core.weights.loading import Networks
 
@@ -157,6 +157,7 @@ class Detector:
         patches = np.stack([self._patch(view, region) for region in regions])
         samples = yield from self._extractor.ask(
             patches, self._moving(regions, patches, factors))
+        yield from in_step()
         scores = self._operator.scores(samples)
         grid = grid_size(int(scores.shape[1]) - 1)
         gains = [factor**-self._scale_slope for factor in factors]

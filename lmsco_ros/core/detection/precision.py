@@ -16,11 +16,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 import math
 
 import numpy as np
 import numpy.typing as npt
-from scipy.linalg import block_diag
 
 from lmsco_ros.core.backend import to_numpy
 from lmsco_ros.core.detection.detector import Detection
@@ -39,8 +39,9 @@ _SIZE_ERROR = 0.02
 
 def box_covariance(detection: Detection, box: BoundingBox) -> npt.NDArray[np.float64]:
     """Return the covariance of center x, center y, width and height of a measured box, in px^2."""
-    center = center_covariance(detection, math.sqrt(box.area))
-    return np.asarray(block_diag(center, *np.square(_SIZE_ERROR * np.array(box.size))))
+    covariance = np.diag([0.0, 0.0, *((_SIZE_ERROR * side)**2 for side in box.size)])
+    covariance[:2, :2] = center_covariance(detection, math.sqrt(box.area))
+    return covariance
 
 
 def center_covariance(detection: Detection, side: float) -> npt.NDArray[np.float64]:
@@ -66,12 +67,21 @@ def center_covariance(detection: Detection, side: float) -> npt.NDArray[np.float
     sizes = np.array([detection.region.width, detection.region.height])
     ratio = max(detection.sharpness, 1e-6)
     precision = -curvature(to_numpy(detection.scores), detection.peak.displacement)[::-1, ::-1]
-    values, axes = np.linalg.eigh(precision / max(detection.peak.value, 1e-12))
-    deviations = np.minimum(
-        _INFLATION / (ratio * np.sqrt(np.maximum(values, 1e-12))), _LARGEST_DEVIATION)
-    covariance = (axes * deviations**2) @ axes.T
+    covariance = _of_eigenvalues(
+        precision / max(detection.peak.value, 1e-12), lambda value: min(
+            _INFLATION / (ratio * math.sqrt(max(value, 1e-12))), _LARGEST_DEVIATION)**2)
     way, chance = _other_peak(detection, side)
     return (covariance + chance * np.outer(way, way)) * np.outer(sizes, sizes)
+
+
+def _of_eigenvalues(matrix: npt.NDArray[np.float64],
+                    function: Callable[[float], float]) -> npt.NDArray[np.float64]:
+    """Return the symmetric matrix (2, 2) with the same axes and a function of the eigenvalues."""
+    (xx, xy), (_, yy) = matrix.tolist()
+    middle, radius = (xx + yy) / 2, math.hypot((xx - yy) / 2, xy)
+    low, high = function(middle - radius), function(middle + radius)
+    slope = (high - low) / (2 * radius) if radius > 0 else 0.0
+    return (low + high) / 2 * np.eye(2) + slope * (matrix - middle * np.eye(2))
 
 
 def _other_peak(detection: Detection,

@@ -16,6 +16,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 import math
 from typing import TYPE_CHECKING
@@ -109,12 +110,11 @@ class ExtentMeter:
         return at_once(self.ask(view, box))
 
     def ask(self, view: FrameView, box: BoundingBox) -> Asking[Measurement]:
-        """Return the extent as `__call__` does, and ask the network for the encoding."""
+        """Return the extent as `__call__` does, and ask the network for it."""
         network = self._network
-        encoding = yield Ask(id(network), network.encode_all, _patch(network, view, box))
-        # One by one: in a batch this part gives other bits, which what is measured feeds back.
-        answer = network.relate(
-            self._reference, encoding, (self._first_side, math.log2(_side(box))))
+        answer = yield Ask(id(network), network.answers, (
+            _patch(network, view, box), self._reference,
+            (self._first_side, math.log2(_side(box)))))
         unit = self._network.context * _side(box) / 2
         expected = np.array([[box.x, box.x + box.width], [box.y, box.y + box.height]])
         # The network speaks of left, top, right, bottom, and of Laplace distributions.
@@ -128,15 +128,14 @@ def _patch(network: ExtentNet, view: FrameView, box: BoundingBox) -> np.ndarray:
     size, side = network.size, network.context * _side(box)
     region = BoundingBox.from_center(box.center, (side, side))
     image = BoundingBox(0, 0, *view.size)
-    return np.stack([view.patch(region, (size, size)), _covered(region, box, size),
-                     _covered(region, image, size)])
+    return np.stack([view.patch(region, (size, size)), *_covered(region, (box, image), size)])
 
 
 def _apart(edges: np.ndarray) -> np.ndarray:
     """Return edges in their order, and no nearer to each other than can be seen."""
-    middle = edges.mean(axis=1, keepdims=True)
-    half = np.maximum(np.abs(np.diff(edges, axis=1)), _SMALLEST_SIDE) / 2
-    return np.concatenate([middle - half, middle + half], axis=1)
+    near, far = edges[:, :1], edges[:, 1:]
+    half = np.maximum(np.abs(far - near), _SMALLEST_SIDE) / 2
+    return (near + far) / 2 + half * (-1.0, 1.0)
 
 
 def _side(box: BoundingBox) -> float:
@@ -144,12 +143,12 @@ def _side(box: BoundingBox) -> float:
     return math.sqrt(box.area)
 
 
-def _covered(region: BoundingBox, box: BoundingBox, size: int) -> np.ndarray:
-    """Return how much of each pixel of a patch of a region a box covers, shape (size, size)."""
-    spans = []
-    for start, length, low, high in (
-            (region.y, region.height, box.y, box.y + box.height),
-            (region.x, region.width, box.x, box.x + box.width)):
-        lines = np.clip(np.linspace(start, start + length, size + 1), low, high)
-        spans.append(np.diff(lines) * (size / length))
-    return np.outer(*spans).astype(np.float32)
+def _covered(region: BoundingBox, boxes: Sequence[BoundingBox], size: int) -> np.ndarray:
+    """Return how much of each pixel of a patch of a region boxes cover, shape (n, size, size)."""
+    start, length = np.array([(region.y, region.x), (region.height, region.width)])
+    lines = start + np.arange(size + 1)[:, None] * (length / size)
+    low = np.array([(box.y, box.x) for box in boxes])[:, None]
+    high = np.array([(box.y + box.height, box.x + box.width) for box in boxes])[:, None]
+    inside = np.minimum(np.maximum(lines, low), high)
+    spans = (inside[:, 1:] - inside[:, :-1]) * (size / length)
+    return (spans[:, :, None, 0] * spans[:, None, :, 1]).astype(np.float32)

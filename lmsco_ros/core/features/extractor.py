@@ -201,7 +201,7 @@ def normalize(channels: Array, weight: float = 1.0) -> Array:
     xp = array_namespace(channels)
     rows = xp.reshape(channels, (channels.shape[0], -1))
     energy = xp.vecdot(rows, rows) / rows.shape[1]
-    factor = xp.where(energy > 0, weight / xp.sqrt(xp.where(energy > 0, energy, 1.0)), 0.0)
+    factor = weight / xp.sqrt(xp.where(energy > 0, energy, xp.inf))
     return channels * xp.reshape(factor, (-1,) + (1,) * (channels.ndim - 1))
 
 

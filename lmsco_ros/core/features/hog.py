@@ -130,7 +130,7 @@ def _votes(patches: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 def _differences(patches: np.ndarray, axis: int) -> np.ndarray:
     """Return the central differences along an axis, one-sided at the border."""
     result = np.empty_like(patches)
-    pixels, differences = np.moveaxis(patches, axis, 0), np.moveaxis(result, axis, 0)
+    pixels, differences = patches.swapaxes(0, axis), result.swapaxes(0, axis)
     np.subtract(pixels[2:], pixels[:-2], out=differences[1:-1])
     np.subtract(pixels[1], pixels[0], out=differences[0])
     np.subtract(pixels[-1], pixels[-2], out=differences[-1])

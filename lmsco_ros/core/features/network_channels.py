@@ -102,9 +102,10 @@ class NetworkChannels:
         """
         images = torch.from_numpy(patches).to(self._device)
         images = images[:, None] if images.ndim == 3 else images.permute(0, 3, 1, 2)
-        margin = (self._network.margin,) * 4
-        extended = torch.nn.functional.pad(images, margin, mode='replicate')
-        maps = dict(zip(self._layers, self._network(extended, self._layers), strict=True))
+        if self._network.margin:
+            margin = (self._network.margin,) * 4
+            images = torch.nn.functional.pad(images, margin, mode='replicate')
+        maps = dict(zip(self._layers, self._network(images, self._layers), strict=True))
         return {(name, cell): self._cells(maps[layer], layer, cell)
                 for (name, cell), layer in self._requests.items()}
 

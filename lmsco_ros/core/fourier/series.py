@@ -149,7 +149,7 @@ def shift(series: Array, displacement: tuple[float, float]) -> Array:
     order = bandwidth(series)
     rows = _phase(series, range(-order, order + 1), displacement[0])
     columns = _phase(series, range(order + 1), displacement[1])
-    phase = xp.expand_dims(rows, axis=1) * xp.expand_dims(columns, axis=0)
+    phase = rows[:, None] * columns[None, :]
     return series * xp.reshape(phase, phase.shape + (1,) * (series.ndim - 2))
 
 

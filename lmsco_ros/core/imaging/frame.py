@@ -72,11 +72,11 @@ def read_frame(image: np.ndarray) -> Frame:
     if values.ndim == 3 and values.shape[2] == 1:
         values, image = values[:, :, 0], image[:, :, 0]
     _check(values)
-    kind = f'{values.shape} {values.dtype.name}'
-    if np.ma.is_masked(image):
+    name = values.dtype.name
+    kind = f'{values.shape} {name}'
+    if isinstance(image, np.ma.MaskedArray) and np.ma.is_masked(image):
         return Frame(_without_masked(values, np.ma.getmaskarray(image)), kind)
-    keeps = values.dtype.name in ('uint8', 'uint16')
-    return Frame(_converted(values, values.dtype.name if keeps else 'float32'), kind)
+    return Frame(_converted(values, name if name in ('uint8', 'uint16') else 'float32'), kind)
 
 
 def _way_to_array(image: object) -> str:

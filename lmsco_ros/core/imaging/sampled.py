@@ -72,7 +72,7 @@ def percentiles(values: np.ndarray, shares: tuple[float, ...]) -> list[float]:
     places = np.asarray(shares) / 100 * (values.size - 1)
     below = np.floor(places).astype(int)
     above = np.minimum(below + 1, values.size - 1)
-    order = np.partition(values, np.unique([*below, *above]), axis=None)
+    order = np.partition(values, sorted({*below.tolist(), *above.tolist()}), axis=None)
     start, end = order[below].astype(np.float64), order[above].astype(np.float64)
     return (start + (places - below) * (end - start)).tolist()
 
@@ -129,8 +129,8 @@ def noise_deviation(image: np.ndarray) -> float:
     step = min(height, max(1, height * width // _NOISE_POINTS))
     rows = measured(to_gray(image[step // 2::step])).astype(np.float32, copy=False)
     second = np.abs(rows[:, 2:] + rows[:, :-2] - 2 * rows[:, 1:-1])
-    known = second[np.isfinite(second)]
-    return float(np.median(known)) / (_MEDIAN * _SECOND_DIFFERENCE) if known.size else 0.0
+    known = second[np.isfinite(second)] if image.dtype == np.float32 else second.ravel()
+    return percentiles(known, (50.0,))[0] / (_MEDIAN * _SECOND_DIFFERENCE) if known.size else 0.0
 
 
 def _step(image: np.ndarray) -> int:

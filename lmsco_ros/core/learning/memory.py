@@ -45,7 +45,7 @@ def score(blocks: Sequence[Array], filters: Sequence[Array]) -> Array:
     """
     order = max(bandwidth(block) for block in blocks)
     xp = array_namespace(blocks[0])
-    parts = [embed(xp.matmul(block, xp.expand_dims(weights, axis=-1))[..., 0], order)
+    parts = [embed(xp.matmul(block, weights[..., None])[..., 0], order)
              for block, weights in zip(blocks, filters, strict=True)]
     total = parts[0]
     for part in parts[1:]:
@@ -178,6 +178,6 @@ class SampleMemory:
         weighted = xp.conj(residual) * self.weights
         result = []
         for block in self.blocks:
-            rows = xp.expand_dims(crop(weighted, bandwidth(block)), axis=-2)
+            rows = crop(weighted, bandwidth(block))[..., None, :]
             result.append(xp.conj(xp.matmul(rows, block)[..., 0, :]))
         return result

@@ -25,9 +25,13 @@ from torch import nn
 from lmsco_ros.core.networks.backbone import Backbone, Layer
 from lmsco_ros.core.networks.layers import convolve, standardize
 
-__all__ = ['ExtentNet']
+__all__ = ['ExtentNet', 'Question']
 
 _CONTRAST_LIMIT = 6.0
+
+
+Question = tuple[np.ndarray, torch.Tensor, tuple[float, float]]
+"""A patch, shape (3, size, size); what `reference` makes of the target; sides as in `measure`."""
 
 
 class ExtentNet(Backbone):
@@ -81,17 +85,15 @@ class ExtentNet(Backbone):
         return self.answer.weight.new_zeros(1, 64, 8, 8)
 
     @torch.inference_mode()
-    def encode_all(self, patches: Sequence[np.ndarray]) -> list[torch.Tensor]:
-        """Return what `encode` returns for each of several patches, in one pass."""
-        images = torch.from_numpy(np.stack(patches))
-        return list(self(images.to(self.answer.weight.device))[0].split(1))
-
-    @torch.inference_mode()
-    def relate(self, reference: torch.Tensor, now: torch.Tensor,
-               sides: tuple[float, float]) -> np.ndarray:
-        """Return the answer of `measure` for one encoding, shape (9,), float64."""
-        answer = self.measure(reference, now, now.new_tensor([sides]))[0]
-        return answer.cpu().numpy().astype(np.float64)
+    def answers(self, questions: Sequence[Question]) -> list[np.ndarray]:
+        """Return what `measure` says to each of several questions, shape (9,), float64."""
+        images = torch.from_numpy(np.stack([patch for patch, _, _ in questions]))
+        encodings = self(images.to(self.answer.weight.device))[0].split(1)
+        # One by one: in a batch this part gives other bits, which what is measured feeds back.
+        # One right after the other: the weights are still in the caches of the processor.
+        told = [self.measure(reference, now, now.new_tensor([sides]))[0]
+                for (_, reference, sides), now in zip(questions, encodings, strict=True)]
+        return [answer.cpu().numpy().astype(np.float64) for answer in told]
 
     def reference(self, first: torch.Tensor) -> torch.Tensor:
         """

@@ -38,10 +38,6 @@ class FakeNetwork:
     def __init__(self, answer=np.zeros(9)):
         self.answer, self.shown, self.sides = np.asarray(answer, float), [], None
 
-    def encode_all(self, patches):
-        """Return the patches themselves."""
-        return [self.encode(patch) for patch in patches]
-
     def encode(self, patch):
         """Return the patch itself."""
         self.shown.append(patch)
@@ -51,11 +47,13 @@ class FakeNetwork:
         """Return a name for it."""
         return 'first', encoding
 
-    def relate(self, reference, now, sides):
-        """Return the answer."""
-        assert reference[0] == 'first' and reference[1] is self.shown[0]
-        self.sides = sides
-        return self.answer
+    def answers(self, questions):
+        """Return the answer to each question."""
+        for patch, reference, sides in questions:
+            assert reference[0] == 'first' and reference[1] is self.shown[0]
+            self.shown.append(patch)
+            self.sides = sides
+        return [self.answer] * len(questions)
 
 
 def view(image):

@@ -17,9 +17,10 @@
 from hypothesis import given, strategies as st
 import numpy as np
 import pytest
+import torch
 
 from lmsco_ros.core.networks.extent import ExtentNet
-from lmsco_ros.core.networks.together import Ask, at_once, side_by_side
+from lmsco_ros.core.networks.together import Ask, at_once, in_step, side_by_side
 
 
 class Doubler:
@@ -72,9 +73,34 @@ def test_too_few_answers_are_an_error():
         side_by_side({1: work(lambda subjects: [], [1])})
 
 
-def test_encodings_of_several_patches_are_those_of_each(rng, random_network):
+def test_works_wait_for_each_other():
+    done = []
+
+    def walk(name, asks):
+        told = []
+        for number in range(asks):
+            told.append((yield Ask('doubler', doubler, number)))
+        done.append(name)
+        yield from in_step()
+        done.append(name.upper())
+        return told
+
+    doubler = Doubler()
+    assert side_by_side({1: walk('a', 1), 2: walk('b', 1)}) == {1: [0], 2: [0]}
+    assert done == ['a', 'b', 'A', 'B']
+    done.clear()
+    assert at_once(walk('c', 2)) == [0, 2] and done == ['c', 'C']
+
+
+def test_answers_to_several_questions_are_those_to_each(rng, random_network):
     network = random_network(ExtentNet)
-    patches = [rng.random((3, 64, 64), dtype=np.float32) for _ in range(3)]
-    for patch, encoding in zip(patches, network.encode_all(patches), strict=True):
-        assert encoding.shape == (1, 64, 8, 8)
-        np.testing.assert_allclose(encoding, network.encode(patch), atol=1e-5)
+    questions = [(rng.random((3, 64, 64), dtype=np.float32),
+                  torch.from_numpy(rng.random((1, 96, 8, 8), dtype=np.float32)),
+                  (rng.uniform(2, 8), rng.uniform(2, 8))) for _ in range(3)]
+    for question, answer in zip(questions, network.answers(questions), strict=True):
+        alone, = network.answers([question])
+        patch, reference, sides = question
+        measured = network.measure(reference, network.encode(patch), torch.tensor([sides]))[0]
+        assert answer.shape == (9,) and answer.dtype == np.float64
+        np.testing.assert_allclose(answer, alone, atol=1e-5)
+        np.testing.assert_allclose(answer, measured, atol=1e-5)

@@ -133,7 +133,7 @@ def names(parts):
     return [made[0] for made in parts.mock_calls]
 
 
-def test_plain_frame_is_seen_judged_followed_and_learned_in_this_order(parts, track):
+def test_plain_frame_is_seen_judged_followed_and_remembered_in_this_order(parts, track):
     advance(track, frame())
     parts.reset_mock()
     advance(track, frame())
@@ -142,7 +142,7 @@ def test_plain_frame_is_seen_judged_followed_and_learned_in_this_order(parts, tr
         'observer.look',
         'monitor.believable', 'monitor.judge', 'extent', 'prediction.seen',
         'redetection.restart', 'observer.keep', 'motion.measure', 'detector.remember',
-        'detector.train', 'prediction.expected', 'detector.watch']
+        'prediction.expected', 'detector.watch']
 
 
 def test_frame_is_examined_and_seen_in_its_range(parts, track):
@@ -236,7 +236,7 @@ def test_frames_of_a_closed_shutter_are_not_counted(parts, track):
     parts.gain.examine.side_effect = [PLAIN, SHUT, PLAIN, PLAIN]
     for _ in range(4):
         advance(track, frame())
-    # The filter is trained in the second frame that shows something.
+    # The filter is trained after the second frame that shows something.
     assert [made for made in names(parts) if made in ('detector.train', 'observer.look')] == [
         'observer.look', 'observer.look', 'detector.train', 'observer.look']
 
@@ -395,13 +395,43 @@ def test_filter_learns_what_was_seen_and_trains_every_other_frame(parts, track):
         advance(track, frame())
     assert parts.detector.remember.call_args_list == 4 * [
         call(HERE.detection, pytest.approx((52, 36)))]
+    track.learn()
     assert parts.detector.train.call_args_list == 2 * [call()]
+
+
+def test_next_frame_learns_first_what_nobody_has_learned_before(parts, track):
+    for _ in range(3):
+        advance(track, frame())
+    assert [made for made in names(parts) if made in ('detector.train', 'gain.examine')] == [
+        'gain.examine', 'gain.examine', 'detector.train', 'gain.examine']
+
+
+def test_frame_is_learned_from_once(parts, track):
+    track.learn()
+    for _ in range(2):
+        advance(track, frame())
+    assert not parts.detector.train.called
+    track.learn()
+    track.learn()
+    advance(track, frame())
+    parts.detector.train.assert_called_once_with()
+
+
+def test_training_that_fails_is_tried_again(parts, track):
+    for _ in range(2):
+        advance(track, frame())
+    parts.detector.train.side_effect = [MemoryError, None]
+    with pytest.raises(MemoryError):
+        track.learn()
+    advance(track, frame())
+    assert parts.detector.train.call_count == 2
 
 
 def test_doubted_target_is_not_learned(parts, track):
     parts.monitor.judge.return_value = DOUBTED
     advance(track, frame())
     advance(track, frame())
+    track.learn()
     for unwanted in ('detector.remember', 'detector.train'):
         assert unwanted not in names(parts)
 
