@@ -21,7 +21,6 @@ Values are given where they are not those of the section.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import replace
 from types import MappingProxyType
 from typing import Any
 
@@ -42,7 +41,8 @@ _APPEARANCE = (FeatureConfig((ChannelConfig('appearance', layer='shallow'),), ce
 _MOTION = (FeatureConfig((ChannelConfig('motion', layer='deep'),), cell=16),)
 
 _DEFAULT: Mapping[str, Any] = {
-    'features': (replace(HANDCRAFTED[0], projection=16),),
+    'features': (FeatureConfig((ChannelConfig('appearance', power=0.5, layer='features'),
+                                *HANDCRAFTED[0].channels), projection=32),),
     'sampling': SamplingConfig(search_factor=4.0, patch_size_min=80, patch_size_max=80),
     'learning': LearningConfig(iterations=1, gradient_steps=1, update_interval=2),
     'extent': ExtentConfig('extent'),
