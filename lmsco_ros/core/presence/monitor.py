@@ -37,8 +37,8 @@ _ELSEWHERE, _AGREEING = 2.5, 2.0
 # Frames after a target was found again in which a single doubt is enough to give it up.
 _PROBATION = 5
 
-# Belief that is enough for a jump, and to find again what has hardly moved; and that with which
-# what was seen a frame before is found elsewhere at once.
+# Belief that is enough for a jump, and to find again what has hardly moved; and score, or belief,
+# with which what was seen a frame before is found elsewhere at once.
 _LIKELY, _OVERWHELMING = 0.5, 0.85
 # Score of the first frame from which the target stands out there: all 88 of the train part do, and
 # two of as many pieces of empty ground.
@@ -90,7 +90,8 @@ class PresenceMonitor:
     @property
     def hurried(self) -> bool:
         """Whether the target was seen, or the view has changed, so shortly ago that it hurries."""
-        return self._misses < self.config.lost_frames or self._just_cut
+        recent = self.config.lost_frames
+        return self._misses < recent or self._cut > _CUT_FRAMES - recent
 
     def start(self, evidence: Evidence) -> Verdict:
         """
@@ -134,8 +135,8 @@ class PresenceMonitor:
         Filter, first filter and extent network must agree, each of them; less so after a cut.
         """
         found, part = _AFTER_CUT[:2] if self.after_cut else (1.0, 1.0)
-        return (self._likely(seen) >= min(self.config.found, found)
-                and seen.quality >= part * self.config.sharp
+        likely = seen.score >= min(self.config.found, found) or self._overwhelming(seen)
+        return (likely and seen.quality >= part * self.config.sharp
                 and seen.likeness >= part * self.config.alike
                 and (seen.evidence.presence is None or self.present(seen.evidence.presence)))
 
@@ -206,21 +207,19 @@ class PresenceMonitor:
         if self._state is TrackState.LOST:
             return True
         farthest = JUMP if self.after_cut else _ELSEWHERE
-        overwhelming = self._likely(seen) >= _OVERWHELMING and self.convincing(seen)
+        overwhelming = self._overwhelming(seen) and self.convincing(seen)
         return seen.evidence.jump > farthest and not overwhelming
 
-    @property
-    def _just_cut(self) -> bool:
-        """Whether the view has changed in one of the last frames."""
-        return self._cut > _CUT_FRAMES - self.config.lost_frames
-
-    def _likely(self, seen: Assessment) -> float:
+    def _overwhelming(self, seen: Assessment) -> bool:
         """
-        Return how probable it is that something elsewhere is the target.
+        Return whether hardly anything but the target is likely to look like this.
 
-        Shortly after a cut a part of it is enough: hardly anything else will be that.
+        Shortly after a cut a part of it is enough, which is about as likely to be in the picture
+        as before; but what did not stand out at the start has no parts.
         """
-        return seen.belief if self._just_cut and not self._doubtful else seen.score
+        shortly = self._cut > _CUT_FRAMES - self.config.lost_frames and not self._doubtful
+        sure = seen.belief if shortly else seen.score
+        return sure >= max(_OVERWHELMING, self.config.found)
 
     def _note(self) -> str:
         """Return what is told of a start that nothing has stood out from since."""
