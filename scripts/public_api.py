@@ -44,10 +44,11 @@ PAGE = REPOSITORY / 'docs' / 'public_api.md'
 HEAD = """\
 # Public names
 
-Written by `scripts/public_api.py` from the code; do not change by hand. On these names others may rely: none
-goes without a deprecation before, and none changes its meaning within a first number of the version
-(`RELEASING.md` has the rules). `=` marks parameters that may be left out; further ones may be added. What the names
-mean: [API](api.md), [configuration](configuration.md), `lmsco COMMAND --help`, and the tables of the README.
+Written by `scripts/public_api.py` from the code; do not change by hand. On these names others may
+rely: none goes without a deprecation before, and none changes its meaning within a first number of
+the version (`RELEASING.md` has the rules). `=` marks parameters that may be left out; further ones
+may be added. What the names mean: [API](api.md), [configuration](configuration.md), `lmsco COMMAND
+--help`, and the tables of the README.
 """
 # How the adapters read files of images is their own affair.
 INNER_ADAPTERS = {'compressed_depth', 'encodings', 'image_file', 'jpeg_file', 'png_file'}

@@ -181,7 +181,8 @@ def test_release_names_every_place_of_the_version():
 
 def test_the_version_that_is_released_is_one_that_is_mended():
     """And the declaration says of 1.0.0 and more what it says of nothing less."""
-    rows = re.findall(r'^\| (\d+\.\d+).*\| yes \|$', (REPOSITORY / 'SECURITY.md').read_text(), re.M)
+    policy = (REPOSITORY / 'SECURITY.md').read_text()
+    rows = re.findall(r'^\| (\d+\.\d+).*\| yes \|$', policy, re.M)
     assert lmsco_ros.__version__.rpartition('.')[0] in rows
     declaration = (REPOSITORY / 'QUALITY_DECLARATION.md').read_text()
     stated = re.search(r'^\| 1\.ii stable version \| (.*) \|$', declaration, re.M)

@@ -25,7 +25,7 @@ import msg_adapters
 
 REPOSITORY = Path(__file__).resolve().parents[2]
 PAGE = (REPOSITORY / 'docs' / 'public_api.md').read_text(encoding='utf-8')
-# What every example of the pages uses: written here a second time, so that the page cannot lose it.
+# What most programs use: written here a second time, so that the page cannot lose it.
 CORNERSTONES = {
     'LMSCOTracker.initialize(image, box, time=)', 'LMSCOTracker.update(image, time=)',
     'TrackResult.box', 'TrackResult.score', 'TrackResult.state', 'TrackResult.predicted_box',
