@@ -15,7 +15,7 @@
 """
 A thermal scene in which the target meets a twin, is lost and comes back; with exact ground truth.
 
-A person walks across open ground and comes nearer. A twin, as warm and nearly as tall, passes them.
+A person walks across open ground and comes nearer. A twin, as warm and nearly as tall, passes by.
 A truck stops in front of the person for some seconds, and drives on.
 """
 
