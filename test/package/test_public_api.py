@@ -35,7 +35,7 @@ CORNERSTONES = {
     'lmsco evaluate --tracker', 'lmsco weights fetch NAME', 'lmsco doctor',
     'topic ~/box out geometry_msgs/msg/PolygonStamped', 'service ~/reset std_srvs/srv/Trigger',
     'parameter frame_policy',
-    'boxes.csv: frame, stamp, x, y, width, height, score, state, id', 'record: boxes'}
+    'boxes.csv: frame, stamp, x, y, width, height, score, state, id, note', 'record: boxes'}
 
 
 @pytest.fixture(scope='module')
