@@ -22,6 +22,7 @@ is a promise; both are seen in the difference of the page. What is promised: `RE
 from __future__ import annotations
 
 import ast
+from collections import ChainMap
 from collections.abc import Iterator
 import dataclasses
 import inspect
@@ -66,11 +67,13 @@ def python_names() -> Iterator[str]:
 
 
 def _members(exported: type) -> Iterator[str]:
-    """Yield fields, properties and methods of a class, methods with their parameters."""
+    """Yield fields, properties and methods, also inherited ones; methods with parameters."""
     fields = {field.name for field in dataclasses.fields(exported)
               } if dataclasses.is_dataclass(exported) else set()
     yield from (name for name in fields if not name.startswith('_'))
-    for name, member in vars(exported).items():
+    inherited = [vars(base) for base in exported.__mro__
+                 if base.__module__.startswith(core.__name__)]
+    for name, member in ChainMap(*map(dict, inherited)).items():
         if name.startswith('_') or name in fields:
             continue
         function = inspect.unwrap(getattr(member, '__func__', member))

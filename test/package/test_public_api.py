@@ -28,6 +28,7 @@ PAGE = (REPOSITORY / 'docs' / 'public_api.md').read_text(encoding='utf-8')
 # What most programs use: written here a second time, so that the page cannot lose it.
 CORNERSTONES = {
     'LMSCOTracker.initialize(image, box, time=)', 'LMSCOTracker.update(image, time=)',
+    'LMSCOTracker.learn()', 'MultiTracker.learn()',
     'TrackResult.box', 'TrackResult.score', 'TrackResult.state', 'TrackResult.predicted_box',
     'TrackState.LOST', 'TrackerConfig.preset(name)', 'MultiTracker.ids', 'ConfigError(LMSCOError)',
     'image.image_from_message(message)', 'boxes.polygon_from_box(box, header=)',
