@@ -24,6 +24,7 @@ lint: venv
 docs: venv
 	$(BIN)/python scripts/configuration_page.py
 	$(BIN)/python scripts/module_table.py
+	$(BIN)/python scripts/public_api.py
 	$(BIN)/python -m sphinx -W --keep-going -q docs build/docs
 
 # Whether the tests notice when the heart of the tracker is changed.

@@ -52,7 +52,7 @@ setup(
         (f'share/{PACKAGE}/launch', sorted(glob('launch/*.launch.py'))),
     ],
     # colcon cannot read what setuptools makes of the same in pyproject.toml.
-    python_requires='>=3.10,<3.13',
+    python_requires='>=3.10,<3.14',
     zip_safe=False,
     # No way to write it into pyproject.toml suits both old and new versions of setuptools.
     license='Apache-2.0',

@@ -74,7 +74,7 @@ class Clip:
 
 
 def walking_scene(count: int) -> Clip:
-    """Return the first frames of the scene of the demonstration, 640x512."""
+    """Return the first frames of a walk behind a post, 640x512."""
     scene = list(islice(render_scene(SceneConfig(frames=max(count, SceneConfig.frames))), count))
     return Clip('rendered scene', [frame.image for frame in scene],
                 np.array([frame.box.as_tuple() for frame in scene]))

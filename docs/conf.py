@@ -29,7 +29,7 @@ release = version = version_of('lmsco_ros')
 extensions = ['myst_parser', 'sphinx.ext.autodoc', 'sphinx.ext.autosummary',
               'sphinx.ext.napoleon']
 templates_path = ['_templates']
-exclude_patterns = ['_templates']
+exclude_patterns = ['_templates', '_static']
 myst_heading_anchors = 3
 
 # Classes of two packages may share a name; a type in the text then leads to none of them.
@@ -52,6 +52,7 @@ html_theme_options = {
     # A line of 99 characters fits.
     'code_font_size': '0.8em',
 }
+html_static_path = ['_static']
 html_show_sourcelink = False
 
 

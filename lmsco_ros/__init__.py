@@ -19,4 +19,4 @@ After Peng Gao, Yipeng Ma, Ke Song, Chao Li, Fei Wang, Liyi Xiao: Large Margin S
 Convolution Operator for Thermal Infrared Object Tracking, 2018.
 """
 
-__version__ = '0.1.0'
+__version__ = '1.0.0'

@@ -83,8 +83,9 @@ def find_python(wanted=None):
         if version:
             found.append('{} is {}.{}'.format(python, *version))
     raise Remedy(
-        'Python 3.10, 3.11 or 3.12 is needed, but {}; install one (Debian, Ubuntu: sudo apt '
-        'install python3 python3-venv) or name one: make PYTHON=/path/to/python3.11'
+        'Python 3.10, 3.11 or 3.12 is needed, but {}; install one (Debian 12, Ubuntu: sudo apt '
+        'install python3 python3-venv) or name one: make PYTHON=/path/to/python3.11. Without the '
+        "ROS node 3.13 will do, too: pip install '.[cli,eval,weights]'"
         .format(', '.join(found) or '{} does not run'.format(wanted or 'python3')))
 
 

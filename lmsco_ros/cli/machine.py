@@ -28,7 +28,7 @@ import tempfile
 
 from lmsco_ros.extras import MissingExtraError, MODULES, require_extra
 
-_OLDEST, _NEWEST_OF_ROS = (3, 10), (3, 12)
+_OLDEST, _NEWEST, _NEWEST_OF_ROS = (3, 10), (3, 13), (3, 12)
 _PROFILE = 'FASTRTPS_DEFAULT_PROFILES_FILE'
 _MISSPELT_PROFILE = 'FASTDDS_DEFAULT_PROFILES_FILE'
 _MIDDLEWARE = 'rmw_fastrtps_cpp'
@@ -80,10 +80,13 @@ def python(version: tuple[int, ...]) -> Finding:
     """Judge the version (major, minor) of the interpreter."""
     said = '.'.join(map(str, version))
     if version < _OLDEST:
-        return Finding('Python', State.WRONG, said, 'use Python 3.10, 3.11 or 3.12')
+        return Finding('Python', State.WRONG, said, 'use Python 3.10 to 3.13, 3.12 at most for '
+                       'the node')
+    if version > _NEWEST:
+        return Finding('Python', State.NOTE, said, 'the package is tested on 3.10 to 3.13')
     if version > _NEWEST_OF_ROS:
-        return Finding('Python', State.NOTE, said, 'ROS 2 wheels end at 3.12, which the node '
-                       'needs; the rest of the package is tested on 3.10 to 3.12')
+        return Finding('Python', State.NOTE, said, 'ROS 2 wheels end at 3.12: for the node use '
+                       'Python 3.12; all else runs on this one')
     return Finding('Python', State.GOOD, said)
 
 

@@ -45,15 +45,7 @@ Outcome = Trace | LeftOut
 
 
 class Engine(Protocol):
-    """
-    Who runs trackers over sequences.
-
-    Attributes
-    ----------
-    at_once : int
-        How many of them at the same time.
-
-    """
+    """Who runs trackers over sequences."""
 
     @property
     def at_once(self) -> int:

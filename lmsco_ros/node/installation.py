@@ -30,7 +30,7 @@ def obstacle() -> str:
     missing = [name for name in _PACKAGES if importlib.util.find_spec(name) is None]
     if missing:
         return (f'the node needs ROS 2, and {", ".join(missing)} is not installed; source a ROS 2 '
-                "Jazzy installation, or install the package's extra `ros`")
+                "Jazzy installation, or install the package's extra `ros` (Python 3.10 to 3.12)")
     return _foreign_adapters()
 
 

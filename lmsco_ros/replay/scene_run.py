@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The rendered scene through the real node, at the pace of a camera."""
+"""A scene or a clip through the real node, at the pace of a camera."""
 
 from __future__ import annotations
 
@@ -26,10 +26,10 @@ from rclpy.serialization import deserialize_message
 from sensor_msgs.msg import Image
 
 from lmsco_ros.core.types import BoundingBox, TrackResult, TrackState
+from lmsco_ros.replay.frame import RecordedFrame
 from lmsco_ros.replay.headers import header_at
 from lmsco_ros.replay.node_session import Heard, NodeSession
 from lmsco_ros.replay.player import Player
-from lmsco_ros.synthetic import SceneFrame
 from msg_adapters.image import image_from_message, message_from_image
 
 _NO_MAP = np.zeros((1, 1), np.float32)
@@ -42,8 +42,8 @@ class TrackedFrame:
 
     Attributes
     ----------
-    frame : SceneFrame
-        Image and truth.
+    frame : RecordedFrame
+        As it was sent.
     result : TrackResult
         As it came over the topics.
     latency, tracker_seconds : float
@@ -51,7 +51,7 @@ class TrackedFrame:
 
     """
 
-    frame: SceneFrame
+    frame: RecordedFrame
     result: TrackResult
     latency: float
     tracker_seconds: float
@@ -63,8 +63,10 @@ class SceneRun:
 
     Parameters
     ----------
-    frames : sequence of SceneFrame
-        The scene; the node starts on the truth of the first one.
+    frames : sequence of RecordedFrame
+        What the camera sees; stamps count from the first one.
+    start : BoundingBox
+        The target in the first frame.
     on_sent : callable
         Called for each frame that was sent.
     on_answer : callable
@@ -73,7 +75,7 @@ class SceneRun:
 
     """
 
-    def __init__(self, frames: Sequence[SceneFrame], *,
+    def __init__(self, frames: Sequence[RecordedFrame], start: BoundingBox, *,
                  on_sent: Callable[[], None] = lambda: None,
                  on_answer: Callable[[TrackedFrame], None] = lambda frame: None) -> None:
         self._frames = frames
@@ -81,7 +83,7 @@ class SceneRun:
         self._on_answer = on_answer
         self._maps: dict[int, _ConfidenceMap] = {}
         self._player: Player | None = None
-        self._next, self._box = 0, frames[0].box
+        self._next, self._start, self._box = 0, start, start
 
     def play(self, parameters: Mapping[str, object]) -> None:
         """
@@ -104,7 +106,7 @@ class SceneRun:
             origin = time.time_ns()
             try:
                 # The scene stands still until the node has taken up the target.
-                player.start(first.box, origin + first.stamp_ns)
+                player.start(self._start, origin + first.stamp_ns)
                 self._send(player, first, origin)
                 player.settle(allowed=0)
                 began = time.monotonic() - first.stamp_ns * 1e-9
@@ -122,9 +124,9 @@ class SceneRun:
 
         Frames that the node dropped, because it was not done with earlier ones, are missing.
         """
-        return [item for _, item in self._answered(0, self._frames[0].box)]
+        return [item for _, item in self._answered(0, self._start)]
 
-    def _send(self, player: Player, frame: SceneFrame, origin: int) -> None:
+    def _send(self, player: Player, frame: RecordedFrame, origin: int) -> None:
         stamp = origin + frame.stamp_ns
         player.send(stamp, message_from_image(
             frame.image, header=header_at(stamp, 'thermal_camera')))

@@ -15,5 +15,6 @@
 """Rendered thermal scenes with exact ground truth, for demonstrations and tests."""
 
 from lmsco_ros.synthetic.scene import render_scene, SceneConfig, SceneFrame
+from lmsco_ros.synthetic.story import render_story
 
-__all__ = ['SceneConfig', 'SceneFrame', 'render_scene']
+__all__ = ['SceneConfig', 'SceneFrame', 'render_scene', 'render_story']

@@ -72,8 +72,26 @@ class Layer:
     heat: npt.NDArray[np.float32]
 
 
-def walker(foot: tuple[float, float], height: float, phase: float,
-           heat: float) -> tuple[Capsule, ...]:
+@dataclass(frozen=True)
+class Clothes:
+    """
+    How warm parts of a person look, as shares of the warmth of the whole.
+
+    Attributes
+    ----------
+    head, torso, arms, legs : float
+        Factors; of two limbs the one behind is a little colder.
+
+    """
+
+    head: float = 1.03
+    torso: float = 1.0
+    arms: float = 1.012
+    legs: float = 0.99
+
+
+def walker(foot: tuple[float, float], height: float, phase: float, heat: float,
+           clothes: Clothes = Clothes()) -> tuple[Capsule, ...]:
     """
     Return a person who walks.
 
@@ -86,7 +104,9 @@ def walker(foot: tuple[float, float], height: float, phase: float,
     phase : float
         Phase of the step, in radians; arms and legs swing once in 2 pi.
     heat : float
-        Counts of the clothes; bare skin is warmer.
+        Counts of the body.
+    clothes : Clothes
+        What of it each part shows.
 
     """
     x, ground = foot
@@ -99,12 +119,14 @@ def walker(foot: tuple[float, float], height: float, phase: float,
                        heat * warmth)
 
     head = Capsule(x, ground - 0.92 * height, x, ground - 0.90 * height, 0.08 * height,
-                   1.03 * heat)
-    torso = Capsule(x, ground - 0.72 * height, x, ground - 0.52 * height, 0.12 * height, heat)
-    return (limb(0.48, 0.0, swing, 0.055, 0.99), limb(0.48, 0.0, -swing, 0.055, 0.985),
+                   clothes.head * heat)
+    torso = Capsule(x, ground - 0.72 * height, x, ground - 0.52 * height, 0.12 * height,
+                    clothes.torso * heat)
+    return (limb(0.48, 0.0, swing, 0.055, clothes.legs),
+            limb(0.48, 0.0, -swing, 0.055, clothes.legs - 0.005),
             torso, head,
-            limb(0.77, 0.40, -0.8 * swing, 0.035, 1.008),
-            limb(0.77, 0.40, 0.8 * swing, 0.035, 1.012))
+            limb(0.77, 0.40, -0.8 * swing, 0.035, clothes.arms - 0.004),
+            limb(0.77, 0.40, 0.8 * swing, 0.035, clothes.arms))
 
 
 def bounds(capsules: Sequence[Capsule]) -> BoundingBox:

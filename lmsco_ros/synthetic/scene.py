@@ -22,18 +22,18 @@ a post. Warm stones and bushes stand around.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
 import math
 
-import cv2
 import numpy as np
 import numpy.typing as npt
 
 from lmsco_ros.core.types import BoundingBox
-from lmsco_ros.synthetic.figures import bounds, Capsule, Layer, rasterize, walker
+from lmsco_ros.synthetic.figures import bounds, Capsule, rasterize, walker
 from lmsco_ros.synthetic.landscape import HORIZON, render_landscape
 from lmsco_ros.synthetic.sensor import Sensor
+from lmsco_ros.synthetic.stage import compose, look
 
 _TARGET_HEAT, _DISTRACTOR_HEAT, _POST_HEAT = 7880.0, 7850.0, 7610.0
 _CROSSING, _HIDING = 0.35, 0.64
@@ -125,9 +125,11 @@ def render_scene(config: SceneConfig) -> Iterator[SceneFrame]:
         progress = index / max(1, config.frames - 1)
         time = index / config.fps
         pan = _pan(config, progress)
-        scene = _look(panorama, pan, (config.height, config.width))
+        scene = look(panorama, pan, (config.height, config.width))
         cast = _cast(config, progress, time, pan)
-        visible = _compose(scene, cast)
+        behind, before = ([rasterize(body, scene.shape) for body in bodies]
+                          for bodies in (cast.behind, cast.before))
+        visible = compose(scene, cast.target, behind, before)
         yield SceneFrame(index, round(1e9 * time), sensor.expose(scene, time),
                          bounds(cast.target), visible)
 
@@ -180,42 +182,3 @@ def _cast(config: SceneConfig, progress: float, time: float,
         behind=(walker(stand(other, 0.85 * met_height), 0.85 * met_height, 1.1 * phase + 1,
                        _DISTRACTOR_HEAT),),
         before=((Capsule(*foot, foot[0], foot[1] - 2 * reach, radius, _POST_HEAT),),))
-
-
-def _look(panorama: npt.NDArray[np.float32], pan: tuple[float, float],
-          shape: tuple[int, int]) -> npt.NDArray[np.float32]:
-    """Return the part of the panorama in view, to a fraction of a pixel."""
-    shift = np.array([[1, 0, pan[0]], [0, 1, pan[1]]], np.float64)
-    view = cv2.warpAffine(panorama, shift, shape[::-1], borderMode=cv2.BORDER_REPLICATE,
-                          flags=cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP)
-    return np.asarray(view, np.float32)
-
-
-def _compose(scene: npt.NDArray[np.float32], cast: _Cast) -> float:
-    """Draw the cast into the scene and return the visible share of the target."""
-    for capsules in cast.behind:
-        _paint(scene, rasterize(capsules, scene.shape))
-    target = rasterize(cast.target, scene.shape)
-    _paint(scene, target)
-    seen = np.zeros(scene.shape, np.float32)
-    seen[target.rows, target.columns] = target.alpha
-    for capsules in cast.before:
-        layer = rasterize(capsules, scene.shape)
-        _paint(scene, layer)
-        seen[layer.rows, layer.columns] *= 1 - layer.alpha
-    return min(1.0, float(seen.sum()) / _area(cast.target))
-
-
-def _paint(scene: npt.NDArray[np.float32], layer: Layer) -> None:
-    view = scene[layer.rows, layer.columns]
-    view += layer.alpha * (layer.heat - view)
-
-
-def _area(capsules: Sequence[Capsule]) -> float:
-    """Return the covered area in square pixels, wherever the body stands."""
-    box = bounds(capsules)
-    moved = [Capsule(c.x0 - math.floor(box.x) + 2, c.y0 - math.floor(box.y) + 2,
-                     c.x1 - math.floor(box.x) + 2, c.y1 - math.floor(box.y) + 2,
-                     c.radius, c.heat) for c in capsules]
-    return float(rasterize(moved, (math.ceil(box.height) + 5, math.ceil(box.width) + 5))
-                 .alpha.sum())

@@ -16,8 +16,10 @@
 
 import csv
 import re
+import shutil
 
 import cv2
+import pytest
 
 
 def test_demo_tracks_writes_and_measures(lmsco, tmp_path):
@@ -28,7 +30,10 @@ def test_demo_tracks_writes_and_measures(lmsco, tmp_path):
     assert answered and int(answered[1]) >= 2
     overlap = re.search(r'mean overlap +(\d\.\d+)', outcome.output)
     assert overlap and 0 < float(overlap[1]) <= 1
-    for words in ('precision at 5 px / 20 px', 'latency, image to box', 'p95'):
+    hidden = re.search(r'said lost while hidden +(\d+) of (\d+) frames', outcome.output)
+    assert hidden and int(hidden[1]) <= int(hidden[2]) < int(answered[1])
+    for words in ('found again after', 'precision at 5 px / 20 px', 'latency, image to box',
+                  'p95'):
         assert words in outcome.words
     with (tmp_path / 'demo' / 'boxes.csv').open() as stream:
         assert len(list(csv.DictReader(stream))) == int(answered[1])
@@ -40,3 +45,33 @@ def test_demo_tracks_writes_and_measures(lmsco, tmp_path):
 def test_unknown_preset(lmsco, tmp_path):
     outcome = lmsco('demo', '--preset', 'nope', '--output', tmp_path)
     assert outcome.exit_code == 2 and 'nope' in outcome.words
+
+
+def test_real_clip_is_shown_to_the_node(lmsco, tmp_path, scene_folder, start):
+    outcome = lmsco('demo', '--source', scene_folder, '--init', start, '--frames', 12,
+                    '--output', tmp_path / 'clip')
+    assert outcome.exit_code == 0, outcome.output
+    assert re.search(r'frames answered +\d+ of 12', outcome.output)
+    assert 'latency, image to box' in outcome.words and 'overlap' not in outcome.words
+    with (tmp_path / 'clip' / 'boxes.csv').open() as stream:
+        row = next(csv.DictReader(stream))
+    assert float(row['stamp']) == 0
+    assert [float(row[key]) for key in ('x', 'y')] == pytest.approx(
+        [float(number) for number in start.split(',')[:2]], abs=3)
+
+
+@pytest.mark.parametrize('half', ['--source', '--init'])
+def test_clip_and_target_come_together(lmsco, tmp_path, scene_folder, half):
+    value = {'--source': scene_folder, '--init': '1,2,30,40'}[half]
+    outcome = lmsco('demo', half, value, '--output', tmp_path / 'never')
+    assert outcome.exit_code == 2 and 'give --source and --init x,y,w,h' in outcome.words
+    assert not (tmp_path / 'never').exists()
+
+
+def test_clip_of_one_frame_is_refused(lmsco, tmp_path, scene_folder, start):
+    (tmp_path / 'one').mkdir()
+    shutil.copy(min(scene_folder.iterdir()), tmp_path / 'one')
+    outcome = lmsco('demo', '--source', tmp_path / 'one', '--init', start,
+                    '--output', tmp_path / 'never')
+    assert outcome.exit_code == 2 and 'has 1 frames' in outcome.words
+    assert not (tmp_path / 'never').exists()

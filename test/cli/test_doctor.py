@@ -38,9 +38,15 @@ def test_every_finding_but_a_good_one_has_a_remedy(lmsco):
 
 
 @pytest.mark.parametrize('version, state', [
-    ((3, 9), State.WRONG), ((3, 10), State.GOOD), ((3, 12), State.GOOD), ((3, 13), State.NOTE)])
+    ((3, 9), State.WRONG), ((3, 10), State.GOOD), ((3, 12), State.GOOD), ((3, 13), State.NOTE),
+    ((3, 14), State.NOTE)])
 def test_versions_of_python(version, state):
     assert machine.python(version).state is state
+
+
+def test_newer_versions_are_told_what_they_are_good_for():
+    assert 'for the node use Python 3.12' in machine.python((3, 13)).remedy
+    assert 'tested on 3.10 to 3.13' in machine.python((3, 14)).remedy
 
 
 def test_an_extra_that_is_not_whole_is_named_with_what_it_lacks(monkeypatch):

@@ -100,6 +100,7 @@ def test_unsupported_interpreter_is_named_with_a_remedy(clone, fake_python, vers
     assert message.count('\n') == 1
     assert version.replace(' ', '.') in message and '3.10, 3.11 or 3.12' in message
     assert 'PYTHON=' in message and 'apt install' in message
+    assert '3.13 will do' in message and 'pip install' in message
 
 
 def test_interpreter_that_does_not_run_is_named(clone, tmp_path):

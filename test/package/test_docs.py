@@ -177,3 +177,18 @@ def test_release_names_every_place_of_the_version():
     text = (REPOSITORY / 'RELEASING.md').read_text()
     for place in ('lmsco_ros/__init__.py', 'package.xml', 'CITATION.cff', 'CHANGELOG.rst'):
         assert f'`{place}`' in text
+
+
+def test_the_version_that_is_released_is_one_that_is_mended():
+    """And the declaration says of 1.0.0 and more what it says of nothing less."""
+    policy = (REPOSITORY / 'SECURITY.md').read_text()
+    rows = re.findall(r'^\| (\d+\.\d+).*\| yes \|$', policy, re.M)
+    assert lmsco_ros.__version__.rpartition('.')[0] in rows
+    declaration = (REPOSITORY / 'QUALITY_DECLARATION.md').read_text()
+    stated = re.search(r'^\| 1\.ii stable version \| (.*) \|$', declaration, re.M)
+    assert stated[1] == lmsco_ros.__version__ and not stated[1].startswith('0.')
+
+
+def test_what_is_deprecated_and_how_long_is_told():
+    promise = (REPOSITORY / 'RELEASING.md').read_text().split('\n## What a number promises\n')[1]
+    assert '`DeprecationWarning`' in promise and '(docs/public_api.md)' in promise

@@ -12,50 +12,75 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What is public is there; a name that goes was deprecated before (RELEASING.md)."""
+"""What is public is on its page; a name that goes was deprecated before (RELEASING.md)."""
 
-from inspect import getmembers, isfunction
+import importlib.util
+from pathlib import Path
+import re
 
 import pytest
 
 from lmsco_ros import core
-from lmsco_ros.cli.main import build_app
-from lmsco_ros.core import TrackerConfig
 import msg_adapters
 
-NAMES = {
-    'BoundingBox', 'BoxError', 'BusyError', 'ConfigError', 'ImageError', 'LMSCOError',
-    'LMSCOTracker', 'MultiTracker', 'NotInitializedError', 'PointError', 'TimeError',
-    'TrackerConfig', 'TrackResult', 'TrackState', 'UnknownTargetError', 'WeightsError'}
-RESULT = {'box', 'score', 'state', 'confidence_map', 'search_region', 'predicted_box', 'velocity',
-          'covariance'}
-PRESETS = {'default', 'paper', 'hcs', 'a', 'ma', 'mas'}
-COMMANDS = {'track', 'replay', 'make-bag', 'demo', 'console', 'evaluate', 'results', 'config',
-            'weights', 'doctor'}
+REPOSITORY = Path(__file__).resolve().parents[2]
+PAGE = (REPOSITORY / 'docs' / 'public_api.md').read_text(encoding='utf-8')
+# What most programs use: written here a second time, so that the page cannot lose it.
+CORNERSTONES = {
+    'LMSCOTracker.initialize(image, box, time=)', 'LMSCOTracker.update(image, time=)',
+    'LMSCOTracker.learn()', 'MultiTracker.learn()',
+    'TrackResult.box', 'TrackResult.score', 'TrackResult.state', 'TrackResult.predicted_box',
+    'TrackState.LOST', 'TrackerConfig.preset(name)', 'MultiTracker.ids', 'ConfigError(LMSCOError)',
+    'image.image_from_message(message)', 'boxes.polygon_from_box(box, header=)',
+    'preset: default', 'preset: paper', 'extent.network', 'lmsco track --init',
+    'lmsco evaluate --tracker', 'lmsco weights fetch NAME', 'lmsco doctor',
+    'topic ~/box out geometry_msgs/msg/PolygonStamped', 'service ~/reset std_srvs/srv/Trigger',
+    'parameter frame_policy',
+    'boxes.csv: frame, stamp, x, y, width, height, score, state, id, note', 'record: boxes'}
 
 
-def test_names_of_the_core_are_those_of_the_list():
-    """A new one belongs to the list, from which it can only go by a first number."""
-    assert set(core.__all__) == NAMES
-    assert all(hasattr(core, name) for name in NAMES)
+@pytest.fixture(scope='module')
+def script():
+    """Import the script, which belongs to no package."""
+    path = REPOSITORY / 'scripts' / 'public_api.py'
+    spec = importlib.util.spec_from_file_location('public_api', path)
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
 
 
-@pytest.mark.parametrize('name', sorted(RESULT))
-def test_results_have_their_fields(name):
-    assert name in core.TrackResult.__dataclass_fields__ or hasattr(core.TrackResult, name)
+def names_of(page):
+    """Return the names on a page."""
+    return {line for block in re.findall(r'```text\n(.*?)```', page, re.S)
+            for line in block.splitlines()}
 
 
-def test_the_tracker_has_its_methods():
-    methods = {name for name, _ in getmembers(core.LMSCOTracker, isfunction)}
-    assert {'initialize', 'update', 'reset'} <= methods
+def test_nothing_public_has_gone_or_come_unseen(script):
+    there, listed = names_of(script.page()), names_of(PAGE)
+    assert not listed - there, 'gone without a deprecation (RELEASING.md)'
+    assert not there - listed, 'new: a promise; run: python scripts/public_api.py'
+    assert script.page() == PAGE
 
 
-def test_presets_and_commands_are_there():
-    app = build_app()
-    named = {command.name or command.callback.__name__.replace('_', '-')
-             for command in app.registered_commands}
-    assert PRESETS <= set(TrackerConfig.preset_names())
-    assert COMMANDS <= named | {group.name for group in app.registered_groups}
+def test_the_page_has_what_everybody_uses():
+    assert not CORNERSTONES - names_of(PAGE)
+
+
+def test_a_parameter_that_is_renamed_is_seen(script, monkeypatch):
+    def update(self, picture, time=None):
+        """Take the place of the method."""
+    monkeypatch.setattr(core.LMSCOTracker, 'update', update)
+    assert 'LMSCOTracker.update(picture, time=)' in set(script.python_names())
+
+
+def test_a_name_that_is_no_longer_exported_is_seen(script, monkeypatch):
+    monkeypatch.setattr(core, '__all__', [name for name in core.__all__ if name != 'TimeError'])
+    gone = names_of(PAGE) - names_of(script.page())
+    assert gone == {'TimeError(LMSCOError)'}
+
+
+def test_whatever_is_exported_is_there():
+    assert all(hasattr(core, name) for name in core.__all__)
 
 
 def test_adapters_say_whose_they_are():

@@ -149,7 +149,8 @@ def test_make_targets_exist():
     assert {'demo', 'test', 'lint', 'venv'} <= mentioned <= targets
 
 
-@pytest.mark.parametrize('page', ['README.md', 'CONTRIBUTING.md'])
+@pytest.mark.parametrize('page', ['README.md', 'CONTRIBUTING.md', 'RELEASING.md', 'SECURITY.md',
+                                  'QUALITY_DECLARATION.md'])
 def test_links_lead_somewhere(page):
     """Every relative link is a file of the repository."""
     text = (REPOSITORY / page).read_text()

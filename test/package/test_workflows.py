@@ -53,9 +53,18 @@ def test_workflows_call_targets_that_there_are_and_end(path):
 def test_python_versions_are_those_of_the_package():
     (test,) = (path for path in WORKFLOWS if path.stem == 'test')
     jobs = yaml.safe_load(test.read_text(encoding='utf-8'))['jobs']
-    tested = {item['python'] for item in jobs['wheels']['strategy']['matrix']['include']}
+    wheels = {item['python'] for item in jobs['wheels']['strategy']['matrix']['include']}
+    tested = wheels | set(jobs['plain']['strategy']['matrix']['python'])
     listed = re.findall(r'Python :: (3\.\d+)', (REPOSITORY / 'pyproject.toml').read_text())
     assert tested == set(listed) and jobs['jazzy']['container'] == 'ros:jazzy'
+
+
+def test_what_runs_without_ros_is_there():
+    (test,) = (path for path in WORKFLOWS if path.stem == 'test')
+    (command,) = (line for line in steps(test) if '-m pytest' in line)
+    folders = re.findall(r'\btest/\w+', command)
+    assert len(folders) >= 5 and all((REPOSITORY / folder).is_dir() for folder in folders)
+    assert 'test/node' not in folders
 
 
 @pytest.mark.parametrize('path', FORMS, ids=lambda path: path.stem)

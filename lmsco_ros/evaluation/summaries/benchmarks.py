@@ -15,16 +15,13 @@
 """
 Measures of single benchmarks over a one-pass run, each as its own toolkit takes it.
 
-References
-----------
-.. [1] L. Huang, X. Zhao, K. Huang, "GOT-10k", IEEE TPAMI 43, 2021: average overlap and success
-   rates over the frames of all sequences, without the first ones, of what lies in the image.
-.. [2] H. Fan et al., "LaSOT", CVPR 2019: precision at 0.2 of the target's size.
-.. [3] N. Jiang et al., "Anti-UAV", IEEE TMM 25, 2023: overlap where the target is there, and 1
-   where it is rightly said not to be.
-.. [4] C. Li et al., "RGB-T object tracking: benchmark and baseline", Pattern Recognition 96, 2019:
-   success and precision by the boxes of that channel that a tracker is nearer to.
-
+- GOT-10k: L. Huang, X. Zhao, K. Huang, IEEE TPAMI 43, 2021: average overlap and success rates over
+  the frames of all sequences, without the first ones, of what lies in the image.
+- LaSOT: H. Fan et al., CVPR 2019: precision at 0.2 of the target's size.
+- Anti-UAV: N. Jiang et al., IEEE TMM 25, 2023: overlap where the target is there, and 1 where it
+  is rightly said not to be.
+- RGB-T: C. Li et al., "RGB-T object tracking: benchmark and baseline", Pattern Recognition 96,
+  2019: success and precision by the boxes of that channel that a tracker is nearer to.
 """
 
 from __future__ import annotations
