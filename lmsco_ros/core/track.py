@@ -137,6 +137,8 @@ class Track:
             self.course.measure(self._box, box_covariance(sighting.detection, self._box))
         else:
             self.course.missed(sighting.found if verdict.promising else None)
+            if verdict.state is TrackState.LOST:
+                self.course.lost()
         if verdict.learns:
             self._remember(sighting)
         self._detector.watch(view, self.course.expected(view.size))

@@ -16,7 +16,9 @@
 
 from __future__ import annotations
 
+from collections import deque
 from dataclasses import replace
+import math
 
 import numpy as np
 import numpy.typing as npt
@@ -27,6 +29,9 @@ from lmsco_ros.core.state import FrameClock, TargetState
 from lmsco_ros.core.types import BoundingBox, TrackResult
 
 __all__ = ['Course']
+
+# Frames in which a target vanishes behind something, or into it.
+_BEFORE = 30
 
 
 class Course:
@@ -54,6 +59,7 @@ class Course:
         self._clock, self._motion = FrameClock(time), TargetState(box)
         self._prediction = Prediction()
         self._box = box
+        self._sizes = deque([box.size], maxlen=_BEFORE)
         self._promise: BoundingBox | None = None
 
     @property
@@ -87,6 +93,7 @@ class Course:
     def follow(self, box: BoundingBox, merged: bool = False) -> None:
         """Take note of the box of the target in this frame, alone or merged with another one."""
         self._box, self._promise = box, None
+        self._sizes.append(box.size)
         self._prediction.seen(box.center, merged)
 
     def measure(self, box: BoundingBox, covariance: npt.NDArray[np.float64]) -> None:
@@ -97,6 +104,10 @@ class Course:
         """Take note of a frame without the target, or of a place that may have shown it."""
         self._promise = promise
         self._prediction.missed()
+
+    def lost(self) -> None:
+        """Take note that it is lost: it is expected in the size before it began to vanish."""
+        self._box = BoundingBox.from_center(self._box.center, max(self._sizes, key=math.prod))
 
     def forget(self, image_size: tuple[int, int]) -> None:
         """Take note that the view has changed: the target may be anywhere, at rest."""
