@@ -157,7 +157,7 @@ class Targets:
         self._check(frame, time, self._tracks.values())
         surveyed = survey(frame.pixels, self._config.intensity)
         headings = {number: track.course.heading for number, track in self._tracks.items()
-                    if track.result.state is TrackState.TRACKING}
+                    if track.result.state is not TrackState.LOST}
         return side_by_side({
             number: track.advance(surveyed, time, [
                 place for other, place in headings.items() if other != number])

@@ -259,13 +259,13 @@ class Spy:
         yield
 
 
-def test_targets_know_where_the_certain_ones_among_them_go(scene):
+def test_targets_know_where_those_among_them_go_that_are_not_lost(scene):
     tracker, image = MultiTracker('hcs'), frame(scene, *paths(0))
     for center in paths(0):
         tracker.initialize(image, box_of(center))
     known = tracker._targets._tracks
-    for number, state in zip(known, (TrackState.TRACKING, TrackState.UNCERTAIN,
-                                     TrackState.TRACKING), strict=True):
+    for number, state in zip(known, (TrackState.TRACKING, TrackState.LOST,
+                                     TrackState.UNCERTAIN), strict=True):
         known[number] = Spy(known[number].result, (number, 2 * number), state)
     tracker.update(image)
     assert [spy.others for spy in known.values()] == [[(3, 6)], [(1, 2), (3, 6)], [(1, 2)]]
