@@ -44,7 +44,8 @@ class PresenceConfig:
     lost_frames : int
         Frames in a row that are not believed until the state is LOST.
     found : float
-        Score from which a target is found again, or found where it was not expected.
+        Score from which a target is found again, or found where it was not expected; shortly
+        after a cut a high probability that a part of it is there will do.
     sharp, alike : float
         Sharpness, as a part of the reference, and score of the first frame's filter, as a part
         of that in the first frame, that a target has to reach for this.

@@ -19,6 +19,8 @@ from __future__ import annotations
 import cv2
 import numpy as np
 
+from lmsco_ros.core.imaging.sampled import percentiles
+
 __all__ = ['intensity_channels']
 
 
@@ -43,10 +45,4 @@ def intensity_channels(patch: np.ndarray, cell: int) -> np.ndarray:
     cells = patch.shape[0] // cell
     means = cv2.resize(patch, (cells, cells), interpolation=cv2.INTER_AREA)
     local = cv2.blur(means, (9, 9), borderType=cv2.BORDER_REPLICATE)
-    return np.stack([means - _median(means), means - local], axis=-1)
-
-
-def _median(values: np.ndarray) -> np.float32:
-    """Return the median of few values, by sorting them."""
-    order = np.sort(values, axis=None)
-    return (order[(order.size - 1) // 2] + order[order.size // 2]) / 2
+    return np.stack([means - percentiles(means, (50.0,))[0], means - local], axis=-1)

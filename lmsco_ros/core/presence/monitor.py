@@ -90,8 +90,7 @@ class PresenceMonitor:
     @property
     def hurried(self) -> bool:
         """Whether the target was seen, or the view has changed, so shortly ago that it hurries."""
-        recent = self.config.lost_frames
-        return self._misses < recent or self._cut > _CUT_FRAMES - recent
+        return self._misses < self.config.lost_frames or self._just_cut
 
     def start(self, evidence: Evidence) -> Verdict:
         """
@@ -217,9 +216,13 @@ class PresenceMonitor:
         Shortly after a cut a part of it is enough, which is about as likely to be in the picture
         as before; but what did not stand out at the start has no parts.
         """
-        shortly = self._cut > _CUT_FRAMES - self.config.lost_frames and not self._doubtful
-        sure = seen.belief if shortly else seen.score
+        sure = seen.belief if self._just_cut and not self._doubtful else seen.score
         return sure >= max(_OVERWHELMING, self.config.found)
+
+    @property
+    def _just_cut(self) -> bool:
+        """Whether the view has changed in one of the last frames, and it was not seen since."""
+        return self._cut > _CUT_FRAMES - self.config.lost_frames
 
     def _note(self) -> str:
         """Return what is told of a start that nothing has stood out from since."""
