@@ -17,6 +17,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 
 from lmsco_ros.core.backend import Backend
 from lmsco_ros.core.config import TrackerConfig
@@ -40,6 +41,10 @@ from lmsco_ros.core.types import BoundingBox, TrackResult, TrackState
 from lmsco_ros.core.weights.loading import Networks
 
 __all__ = ['Track']
+
+# Growth in area with which a target that comes in over the border has outgrown what was learned of
+# it, and the deviation of its edges, in sides, with which that is sure.
+_OUTGROWN, _SURE = 1.3, 0.12
 
 
 class Track:
@@ -76,9 +81,8 @@ class Track:
         self._gain = AutomaticGain(config.intensity)
         condition = self._gain.examine(frame)
         view = FrameView(frame.image, condition.intensity)
-        self._detector = Detector(config, backend, networks, view, box)
-        first = self._detector(view, box)
-        self._first_peak = first.peak.value
+        self._new_detector = partial(Detector, config, backend, networks)
+        first = self._learn(view, box)
         meter = ExtentMeter.marked(networks.extent, view, box) if networks.extent else None
         self._monitor = PresenceMonitor(config.presence)
         self._monitor.note_noise(condition.noise)
@@ -124,11 +128,11 @@ class Track:
         known = others and not condition.cut
         neighbors = Neighbors(self.course.heading, tuple(others)) if known else None
         outlook = Outlook(view, self._box, self.course.expected(view.size),
-                          self.course.predicted, neighbors)
+                          self.course.predicted, neighbors, self.course.misses)
         sighting = yield from self._look(outlook)
         if self._after_shutter or not self._monitor.believable(sighting.assessment):
-            sighting = self._redetection(outlook, sighting, self.course.misses,
-                                         after_shutter=self._after_shutter)
+            sighting = self._redetection(
+                outlook, sighting, after_shutter=self._after_shutter)
         self._after_shutter = False
         verdict = self._monitor.judge(sighting.assessment)
         if verdict.believed:
@@ -143,6 +147,8 @@ class Track:
             self._remember(sighting)
         self._detector.watch(view, self.course.expected(view.size))
         self.result = self._describe(view, sighting.detection, verdict)
+        if verdict.believed and self._outgrown(sighting):
+            self._begin_anew(view)
         return self.result
 
     def learn(self) -> None:
@@ -177,6 +183,29 @@ class Track:
         self._redetection.restart()
         if state is TrackState.TRACKING and self._config.presence.distractors:
             self._observer.keep(view, box)
+
+    def _outgrown(self, sighting: Sighting) -> bool:
+        """Return whether what was learned is a small part of what has come in since."""
+        measured = sighting.measurement
+        return (not self._extent.settled and measured is not None
+                and self.result.box.area > _OUTGROWN * self._learned.area
+                and measured.deviations.mean() < _SURE * self.result.box.area**0.5)
+
+    def _begin_anew(self, view: FrameView) -> None:
+        """Learn the target as it is now, as if it was marked in this frame."""
+        first = self._learn(view, self.result.box)
+        self._training_due = False
+        self._observer.begin(self._detector, first)
+        self._monitor.expect_anew()
+        self._detector.watch(view, self.course.expected(view.size))
+
+    def _learn(self, view: FrameView, box: BoundingBox) -> Detection:
+        """Return what a new detector sees of what it has learned."""
+        self._detector = self._new_detector(view, box)
+        self._learned = visible_part(box, view.size)
+        first = self._detector(view, box)
+        self._first_peak = first.peak.value
+        return first
 
     def _remember(self, sighting: Sighting) -> None:
         """Store the sample, and see whether it is time to train the filter."""

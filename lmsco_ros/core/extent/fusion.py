@@ -26,6 +26,7 @@ import numpy as np
 import numpy.typing as npt
 
 from lmsco_ros.core.extent.measurement import Measurement
+from lmsco_ros.core.imaging.regions import at_border
 from lmsco_ros.core.types import BoundingBox
 
 __all__ = ['EdgeFilter', 'place_to_learn']
@@ -39,13 +40,13 @@ _DRAWN, _FOUND = 0.08, 0.08
 # cuts the target.
 _CHANGE, _CHANGE_AT_BORDER = 0.02, 0.15
 _DRAWN_PIXELS = 0.7
-_BORDER_PIXELS = 1.5
 # What a measurement differs from the expectation without telling of a change, in squared
 # deviations over sides: a person has drawn the first box after a convention of his own, and the
 # less sure a measurement is, the more of its error is the same in every frame.
 _CONVENTION = 8.0
-# Frames in which the whole of a target that came in over the border shows how that is drawn.
-_SETTLING = 40
+# Frames in which the whole of a target that came in over the border shows how large it is, and how
+# that is drawn.
+_SETTLING = 100
 _SMALLEST_SIDE = 2.0
 # Deviation of the measured edges, in sides of the target, with which the filter learns half of the
 # way from its own center to the fused one: all of it would lead it away with a neighbor that was
@@ -67,12 +68,16 @@ class EdgeFilter:
     """
 
     def __init__(self, box: BoundingBox, image_size: tuple[int, int]) -> None:
-        self._limits = np.array(image_size, np.float64)
+        self._image_size = image_size
         # A box that the border cuts says nothing of what will be drawn around the whole.
-        cut = bool(self._at_border(_edges(box)).any())
-        self._whole = 0 if cut else _SETTLING
+        self._whole = 0 if any(map(any, at_border(box, image_size))) else _SETTLING
         error = (_DRAWN * _side(box))**2 + _DRAWN_PIXELS**2
         self._covariances = np.tile(np.diag([error, error]), (2, 1, 1))
+
+    @property
+    def settled(self) -> bool:
+        """Whether the whole of the target was in view for long enough, or in the first frame."""
+        return self._whole >= _SETTLING
 
     def __call__(self, box: BoundingBox, measured: Measurement) -> BoundingBox:
         """
@@ -87,24 +92,24 @@ class EdgeFilter:
 
         """
         edges, side = _edges(box), _side(box)
-        at_border = self._at_border(edges) | self._at_border(measured.edges)
-        found = np.where(at_border, 2, 1) * (_FOUND * side)**2
-        change = (np.where(at_border, _CHANGE_AT_BORDER**2, 0) + _CHANGE**2) * side**2
+        cut = self._cut(box) | self._cut(measured.box)
+        settled = min(1.0, self._whole / _SETTLING)
+        open_to_change = np.where(cut, 1.0, 1 - settled)
+        found = (1 + open_to_change) * (_FOUND * side)**2
+        change = ((_CHANGE_AT_BORDER * open_to_change)**2 + _CHANGE**2) * side**2
         size = _size_variance(self._covariances) + change
         predicted = _predicted(found, size)
-        self._whole += not at_border.any()
+        self._whole += not cut.any()
         noise = measured.deviations**2
-        convention = _CONVENTION * min(1.0, self._whole / _SETTLING)
-        differing = _beyond(measured.edges - edges, convention * noise / side)
+        differing = _beyond(measured.edges - edges, settled * _CONVENTION * noise / side)
         gain = predicted @ np.linalg.inv(predicted + noise[:, :, None] * np.eye(2))
         fused = edges + (gain @ differing[:, :, None])[:, :, 0]
         self._covariances = predicted - gain @ predicted
         return _box(fused)
 
-    def _at_border(self, edges: _Array) -> npt.NDArray[np.bool_]:
-        """Return along which axes edges (2, 2) lie at the border of the image, or beyond it."""
-        return ((edges[:, 0] < _BORDER_PIXELS)
-                | (edges[:, 1] > self._limits - _BORDER_PIXELS))
+    def _cut(self, box: BoundingBox) -> npt.NDArray[np.bool_]:
+        """Return along which axes the border of the image cuts a box."""
+        return np.array([any(ends) for ends in at_border(box, self._image_size)])
 
 
 def place_to_learn(found: tuple[float, float], fused: BoundingBox,

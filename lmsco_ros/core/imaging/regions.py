@@ -24,11 +24,13 @@ from lmsco_ros.core.config import SamplingConfig
 from lmsco_ros.core.errors import BoxError
 from lmsco_ros.core.types import BoundingBox
 
-__all__ = ['check_box', 'clamp_box', 'patch_size', 'region_around', 'search_tiles', 'visible_part']
+__all__ = ['at_border', 'check_box', 'clamp_box', 'held_at_border', 'patch_size', 'region_around',
+           'search_tiles', 'visible_part']
 
 _SMALLEST_TARGET = 2.0
 
 _VISIBLE_PART = 0.25
+_BORDER_PIXELS = 1.5
 
 
 def region_around(box: BoundingBox, config: SamplingConfig) -> BoundingBox:
@@ -145,3 +147,40 @@ def visible_part(box: BoundingBox, image_size: tuple[int, int]) -> BoundingBox:
             min(box.y + box.height, float(image_size[1])))
     inside = low == (box.x, box.y) and high == (box.x + box.width, box.y + box.height)
     return box if inside else BoundingBox(*low, high[0] - low[0], high[1] - low[1])
+
+
+def at_border(box: BoundingBox,
+              image_size: tuple[float, float]) -> tuple[tuple[bool, bool], tuple[bool, bool]]:
+    """Return whether left and right, upper and lower edge lie at the border, or beyond it."""
+    horizontal, vertical = (
+        (start < _BORDER_PIXELS, start + length > limit - _BORDER_PIXELS)
+        for start, length, limit in zip((box.x, box.y), box.size, image_size, strict=True))
+    return horizontal, vertical
+
+
+def held_at_border(box: BoundingBox, last: BoundingBox,
+                   image_size: tuple[int, int]) -> BoundingBox:
+    """
+    Return a box with the edges at the border that it had there in the last frame.
+
+    What moves away from the border shows more of itself behind, until the whole of it is in view.
+
+    Parameters
+    ----------
+    box : BoundingBox
+        The target as large as in the last frame.
+    last : BoundingBox
+        The target in that frame.
+    image_size : tuple of int
+        Width and height.
+
+    """
+    if not any(map(any, at_border(last, image_size))):
+        return box
+    edges = [
+        (min(start, 0.0) if low else start, max(end, float(limit)) if high else end)
+        for start, end, limit, (low, high) in zip(
+            (box.x, box.y), (box.x + box.width, box.y + box.height), image_size,
+            at_border(last, image_size), strict=True)]
+    (left, right), (top, bottom) = edges
+    return BoundingBox(left, top, right - left, bottom - top)

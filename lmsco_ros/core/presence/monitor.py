@@ -106,6 +106,10 @@ class PresenceMonitor:
         return Verdict(seen.score, self._state, believed=True, learns=stands_out,
                        note=self._note())
 
+    def expect_anew(self) -> None:
+        """Expect the sharpness of the frames from now on: it is of another filter."""
+        self._expectation = Expectation(self.config.reference_frames)
+
     def note_noise(self, noise: float) -> None:
         """Take note of the noise of the next frame, its deviation in the working range."""
         self._expectation.note_noise(noise)

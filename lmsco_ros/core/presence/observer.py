@@ -24,6 +24,7 @@ from lmsco_ros.core.config import ScaleConfig
 from lmsco_ros.core.detection.detector import Detection, Detector
 from lmsco_ros.core.detection.scale import found_factor
 from lmsco_ros.core.extent.measurement import ExtentMeter, Measurement
+from lmsco_ros.core.imaging.regions import held_at_border
 from lmsco_ros.core.imaging.view import FrameView
 from lmsco_ros.core.networks.together import Asking, at_once
 from lmsco_ros.core.presence.distractors import Distractors
@@ -52,6 +53,8 @@ class Outlook:
         Where its motion has led it meanwhile.
     neighbors : Neighbors or None
         Other targets; None where there are none.
+    misses : int
+        Frames since the target was seen.
 
     """
 
@@ -60,6 +63,11 @@ class Outlook:
     expected: BoundingBox
     predicted: BoundingBox
     neighbors: Neighbors | None = None
+    misses: int = 0
+
+    def come_in(self, box: BoundingBox) -> BoundingBox:
+        """Return the target in a box as large as before, up to a border that cut it just then."""
+        return box if self.misses else held_at_border(box, self.last, self.view.size)
 
     def is_neighbor(self, detection: Detection) -> bool:
         """Return whether another target was detected."""
@@ -74,8 +82,8 @@ class Sighting:
 
     Attributes
     ----------
-    box : BoundingBox
-        Where it was looked for, in the size that it was taken to have.
+    found : BoundingBox
+        Where it is, in the size that was looked for, and up to the border that still cuts it.
     detection : Detection
         What the filter saw there.
     assessment : Assessment
@@ -85,15 +93,10 @@ class Sighting:
 
     """
 
-    box: BoundingBox
+    found: BoundingBox
     detection: Detection
     assessment: Assessment
     measurement: Measurement | None
-
-    @property
-    def found(self) -> BoundingBox:
-        """The box at what was detected, in the size that was looked for."""
-        return self.box.moved_to(self.detection.center)
 
     def sized(self, scale: ScaleConfig) -> BoundingBox:
         """Return that box in the size that was found, where several were searched."""
@@ -119,10 +122,14 @@ class Observer:
 
     def __init__(self, detector: Detector, meter: ExtentMeter | None,
                  monitor: PresenceMonitor, first: Detection) -> None:
-        self._detector = detector
         self._meter = meter
         self._monitor = monitor
         self._distractors = Distractors()
+        self.begin(detector, first)
+
+    def begin(self, detector: Detector, first: Detection) -> None:
+        """Look with a detector from now on, which sees the target in its first frame so."""
+        self._detector = detector
         self._first_likeness = detector.likeness(first)
         self._first_sharpness = first.sharpness
 
@@ -152,7 +159,10 @@ class Observer:
                 detection, outlook.neighbors.own, outlook.neighbors.owned)
         if self.is_distractor(outlook, detection):
             detection = self._detector.near(detection, outlook.expected.center)
-        return (yield from self._ask(outlook, detection, outlook.expected))
+        box = outlook.expected.moved_to(detection.center)
+        # Nothing else would say where it ends.
+        found = box if self._meter is None else outlook.come_in(box)
+        return (yield from self._ask(outlook, detection, found))
 
     def detect(self, outlook: Outlook, box: BoundingBox) -> Detection:
         """Return what the filter sees around a box in its size."""
@@ -160,22 +170,22 @@ class Observer:
 
     def weigh(self, outlook: Outlook, detection: Detection, box: BoundingBox) -> Sighting:
         """Return a detection around a box, measured, with all that speaks for it."""
-        return at_once(self._ask(outlook, detection, box))
+        return at_once(self._ask(outlook, detection, box.moved_to(detection.center)))
 
     def measure(self, outlook: Outlook, box: BoundingBox) -> float | None:
         """Return the log-odds that the target is in a box; None where nothing measures."""
         return None if self._meter is None else self._meter(outlook.view, box).presence
 
     def _ask(self, outlook: Outlook, detection: Detection,
-             box: BoundingBox) -> Asking[Sighting]:
-        """Return a detection as `weigh` does, and ask for what is measured."""
-        measured = None if self._meter is None else (yield from self._meter.ask(
-            outlook.view, box.moved_to(detection.center)))
+             found: BoundingBox) -> Asking[Sighting]:
+        """Return a detection as `weigh` does, and ask for what is measured of it."""
+        measured = None if self._meter is None else (
+            yield from self._meter.ask(outlook.view, found))
         likeness = self._detector.likeness(detection) / self._first_likeness
         jump = math.dist(detection.center, outlook.expected.center) / outlook.expected.area**0.5
-        presence, vagueness = _told(measured, box)
+        presence, vagueness = _told(measured, found)
         evidence = Evidence(detection.sharpness, likeness, presence, vagueness, jump)
-        return Sighting(box, detection, self._monitor.assess(evidence), measured)
+        return Sighting(found, detection, self._monitor.assess(evidence), measured)
 
     def is_distractor(self, outlook: Outlook, detection: Detection) -> bool:
         """Return whether something else than the target was detected; if so, note its place."""

@@ -65,7 +65,7 @@ class Redetection:
         """Begin the next search anew: the target was seen, or the view has changed."""
         self._schedule.restart()
 
-    def __call__(self, outlook: Outlook, here: Sighting, misses: int, *,
+    def __call__(self, outlook: Outlook, here: Sighting, *,
                  after_shutter: bool) -> Sighting:
         """
         Return what convinces most in other places of the image, or what is here.
@@ -76,17 +76,15 @@ class Redetection:
             The frame.
         here : Sighting
             What is where the target was expected.
-        misses : int
-            Frames since the target was seen.
         after_shutter : bool
             Whether this is the first frame after a closed shutter.
 
         """
         self._observer.follow_distractors(outlook)
         if after_shutter or self._monitor.hurried:
-            seen = self._hurried(outlook, here, misses, 2 if after_shutter else 1)
+            seen = self._hurried(outlook, here, 2 if after_shutter else 1)
         else:
-            seen = self._sparing(outlook, here, misses)
+            seen = self._sparing(outlook, here)
         seen.sort(key=lambda sighting: -sighting.assessment.score)
         return next((other for other in seen if self._prefers(outlook, other, here)), here)
 
@@ -96,24 +94,24 @@ class Redetection:
                 and self._monitor.convincing(other.assessment)
                 and not self._observer.is_distractor(outlook, other.detection))
 
-    def _hurried(self, outlook: Outlook, here: Sighting, misses: int,
+    def _hurried(self, outlook: Outlook, here: Sighting,
                  slices: int) -> list[Sighting]:
         """Return what is at salient places and in slices, at the price of several frames."""
-        chosen = self._schedule.salient(misses)
+        chosen = self._schedule.salient(outlook.misses)
         places = self._salient(outlook, self._schedule.candidates) if chosen else []
         seen = [self._look_at(outlook, box) for box in places[chosen.start:chosen.stop]]
         sharpest = self._tiles(outlook, here, slices)
         return seen + ([] if sharpest is None else [self._look_again(outlook, sharpest)])
 
-    def _sparing(self, outlook: Outlook, here: Sighting, misses: int) -> list[Sighting]:
+    def _sparing(self, outlook: Outlook, here: Sighting) -> list[Sighting]:
         """Return what is where the turn is, if anything is: it costs little more than a frame."""
-        turn = self._schedule.turn(misses)
+        turn = self._schedule.turn(outlook.misses)
         if turn is Turn.TILES:
             sharpest = self._tiles(outlook, here, 1)
             if sharpest is None or not self._monitor.hints(sharpest.sharpness):
                 return []
             return [self._look_again(outlook, sharpest)]
-        chosen = self._schedule.measured(misses)
+        chosen = self._schedule.measured(outlook.misses)
         places = self._salient(outlook, _MANY) if chosen else []
         if turn is Turn.ANYWHERE:
             places = places[chosen.start:chosen.stop]

@@ -100,12 +100,33 @@ def test_box_that_the_border_cuts_has_no_convention():
 def test_target_that_came_in_gets_a_convention_when_it_has_settled():
     entered, larger = BoundingBox(60, 80, 30, 28), BoundingBox(59.8, 79.8, 30.4, 28.4)
     changes = []
-    for frames in (1, 40):
+    for frames in (1, 100):
         fuse = EdgeFilter(BoundingBox(0, 80, 8, 20), IMAGE)
         for _ in range(frames):
             fuse(entered, measured(entered, 1.0))
         changes.append(fuse(entered, measured(larger, 1.0)).width - entered.width)
     assert changes[0] > 0.05 and changes[1] == pytest.approx(0, abs=1e-9)
+
+
+def test_target_that_came_in_changes_faster_until_it_has_settled():
+    # Between the fast change at the border and the slow one far from it, ever slower.
+    start, larger = BoundingBox(60, 80, 40, 30), BoundingBox(60, 80, 50, 30)
+    changes = []
+    for frames in (0, 30, 70, 100, 300):
+        fuse = EdgeFilter(BoundingBox(0, 80, 8, 20), IMAGE)
+        for _ in range(frames):
+            fuse(start, measured(start, 2.0))
+        assert fuse.settled is (frames >= 100)
+        fuse._covariances = np.tile(np.eye(2), (2, 1, 1))
+        changes.append(fuse(start, measured(larger, 2.0)).width - 40)
+    assert changes[0] > changes[1] > changes[2] > changes[3] == changes[4] > 0
+
+
+def test_frames_at_the_border_settle_nothing():
+    fuse, cut = EdgeFilter(BoundingBox(0, 80, 8, 20), IMAGE), BoundingBox(0, 80, 40, 30)
+    for _ in range(300):
+        fuse(cut, measured(cut, 2.0))
+    assert not fuse.settled and EdgeFilter(BOX, IMAGE).settled
 
 
 def test_size_at_the_border_changes_faster():
@@ -145,7 +166,7 @@ def test_unit_of_length_does_not_matter_but_for_pixels_of_drawing(scale):
         fuse._covariances = fuse._covariances * factor**2
         place = BoundingBox(*(factor * value for value in BOX.as_tuple()))
         larger = BoundingBox(*(factor * value for value in (90.0, 70.0, 60.0, 50.0)))
-        fuse._limits = fuse._limits * factor + 50
+        fuse._image_size = tuple(factor * side + 50 for side in IMAGE)
         return np.array(fuse(place, measured(larger, 2 * factor)).as_tuple())
 
     assert fused(scale) == pytest.approx(scale * fused(1.0), rel=1e-6)

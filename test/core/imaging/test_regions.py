@@ -24,7 +24,8 @@ from lmsco_ros.core.config import SamplingConfig
 from lmsco_ros.core.errors import BoxError
 from lmsco_ros.core.imaging.gain import IntensityRange
 from lmsco_ros.core.imaging.regions import (
-    check_box, clamp_box, patch_size, region_around, search_tiles, visible_part)
+    at_border, check_box, clamp_box, held_at_border, patch_size, region_around, search_tiles,
+    visible_part)
 from lmsco_ros.core.imaging.view import FrameView
 from lmsco_ros.core.types import BoundingBox
 
@@ -241,6 +242,28 @@ def test_dead_pixels_leave_no_trace(rng, size):
     clean = FrameView(image, counts).patch(region, size)
     repaired = FrameView(broken, counts).patch(region, size)
     assert np.abs(repaired - clean).max() < 0.1
+
+
+@pytest.mark.parametrize('box, cut', [
+    ((10, 10, 20, 20), ((False, False), (False, False))),
+    ((1.4, 10, 20, 20), ((True, False), (False, False))),
+    ((1.6, 10, 20, 20), ((False, False), (False, False))),
+    ((50, -5, 14, 20), ((False, True), (True, False))),
+    ((10, 10, 20, 36.6), ((False, False), (False, True)))])
+def test_edges_at_the_border_are_known(box, cut):
+    assert at_border(BoundingBox(*box), (WIDTH, HEIGHT)) == cut
+
+
+@pytest.mark.parametrize('last, moved, held', [
+    ((20, 20, 10, 10), (26, 22, 10, 10), (26, 22, 10, 10)),
+    ((0, 20, 10, 10), (4, 22, 10, 10), (0, 22, 14, 10)),
+    ((1, 20, 10, 10), (-3, 22, 10, 10), (-3, 22, 10, 10)),
+    ((54, 38, 10, 10), (50, 33, 10, 10), (50, 33, 14, 15))],
+    ids=['in view', 'coming in', 'leaving', 'in the corner'])
+def test_what_moves_away_from_the_border_shows_more_of_itself(last, moved, held):
+    """In an image of 64 x 48 pixels."""
+    assert held_at_border(BoundingBox(*moved), BoundingBox(*last),
+                          (WIDTH, HEIGHT)) == BoundingBox(*held)
 
 
 def test_box_over_the_border_is_shown_up_to_it():

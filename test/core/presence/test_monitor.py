@@ -199,6 +199,16 @@ def test_reference_is_the_median_of_the_first_frames_only(monitor):
     assert late.assess(Evidence(11.0)).quality == pytest.approx(1)
 
 
+def test_another_filter_has_a_sharpness_of_its_own(monitor):
+    for _ in range(4):
+        judge(monitor, evidence(10.0))
+    assert monitor.assess(evidence(5.0)).quality == 0.5
+    monitor.expect_anew()
+    assert monitor.assess(evidence(5.0)).quality == 1.0
+    judge(monitor, evidence(5.0))
+    assert monitor.assess(evidence(2.5)).quality == 0.5
+
+
 def test_first_frame_is_believed():
     assert believable(PresenceMonitor(CONFIG), Evidence(0.5))
 

@@ -14,6 +14,7 @@
 
 """What speaks for a detection: the detector and the network are replaced."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -120,7 +121,7 @@ def test_target_is_looked_for_where_it_is_expected(observer, detector, outlook):
     detector.next = [seen((112.0, 85.0))]
     sighting = look(observer, outlook, (0.9, 1.0))
     assert detector.calls == [(outlook.view, EXPECTED, (0.9, 1.0))]
-    assert sighting.box == EXPECTED and sighting.detection.center == (112.0, 85.0)
+    assert sighting.detection.center == (112.0, 85.0)
     assert detector.neared == []
 
 
@@ -172,6 +173,47 @@ def test_sighting_is_found_where_it_was_detected(observer, detector, outlook):
     assert look(observer, outlook).found == EXPECTED.moved_to((122.0, 89.0))
 
 
+@pytest.fixture
+def entering():
+    """Return a frame after one in which the left border has cut the target."""
+    last = BoundingBox(0, 70, 12, 20)
+    return Outlook(view(), last, last, last)
+
+
+def test_what_moves_in_reaches_to_the_border_that_has_cut_it(
+        observer, detector, meter, entering):
+    # Its middle was 6 pixels from the border and is 11 now; 12 + 5 pixels of it are in view.
+    detector.next = [seen((11.0, 80.0))]
+    sighting = look(observer, entering)
+    assert sighting.found == BoundingBox(0, 70, 17, 20)
+    assert meter.calls == [(entering.view, sighting.found)]
+
+
+def test_what_was_missed_meanwhile_has_the_size_of_before(observer, detector, entering):
+    detector.next = [seen((11.0, 80.0))]
+    assert look(observer, replace(entering, misses=1)).found == BoundingBox(5, 70, 12, 20)
+
+
+def test_what_is_not_measured_keeps_its_size(detector, monitor, entering):
+    detector.next = [seen((11.0, 80.0))]
+    observer = Observer(detector, None, monitor, FIRST)
+    assert look(observer, entering).found == BoundingBox(5, 70, 12, 20)
+
+
+def test_what_is_found_elsewhere_reaches_to_no_border(observer, entering):
+    box = BoundingBox(5, 70, 12, 20)
+    assert observer.weigh(entering, seen(box.center), box).found == box
+
+
+def test_new_detector_is_measured_by_its_own_first_frame(observer, monitor, outlook):
+    other = Detector()
+    observer.begin(other, SimpleNamespace(center=LAST.center, sharpness=4.0, likeness=0.125))
+    other.next = [seen((112.0, 85.0), sharpness=7.0, likeness=0.25)]
+    evidence = look(observer, outlook).assessment.evidence
+    assert (evidence.sharpness, evidence.likeness) == (7.0, 2.0)
+    assert observer.introduce(view(), LAST).sharpness == 4.0
+
+
 def test_odds_of_zero_are_odds(observer, meter, outlook):
     meter.presence = 0.0
     assert look(observer, outlook).assessment.evidence.presence == 0.0
@@ -182,7 +224,7 @@ def test_detection_elsewhere_is_weighed_in_its_own_box(observer, detector, meter
     found = observer.detect(outlook, box)
     assert detector.calls == [(outlook.view, box, (1.0,))]
     sighting = observer.weigh(outlook, found, box)
-    assert (sighting.box, sighting.detection) == (box, found)
+    assert (sighting.found, sighting.detection) == (box, found)
     assert meter.calls == [(outlook.view, box)]
     assert sighting.assessment.evidence.jump == pytest.approx(np.hypot(90, 66) / 20)
 

@@ -14,6 +14,7 @@
 
 """What is looked at while the target is missing, and what of it is taken for the target."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 from unittest.mock import create_autospec, Mock
 
@@ -61,7 +62,7 @@ class Observer:
     def weigh(self, outlook, detection, box):
         self.looked.append(box)
         score = self.seen.get(box.center, {}).get('score', 0.0)
-        return SimpleNamespace(box=box, detection=detection,
+        return SimpleNamespace(found=box, detection=detection,
                                assessment=SimpleNamespace(score=score, place=box.center))
 
     def measure(self, outlook, box):
@@ -123,7 +124,7 @@ def redetect(observer, monitor, salience, outlook, here):
         for made in (observer.detected, observer.looked, observer.asked, observer.followed,
                      observer.measured):
             made.clear()
-        return redetection(outlook, here, misses, after_shutter=after_shutter)
+        return redetection(replace(outlook, misses=misses), here, after_shutter=after_shutter)
     search.restart = redetection.restart
     return search
 
@@ -166,7 +167,8 @@ def test_filter_looks_where_the_network_is_surest_to_see_the_target(
     redetection = Redetection(SearchConfig(candidates=6), observer, monitor, outlook.view, LAST)
     observer.presence = {SALIENT[0].center: 0.5, SALIENT[1].center: 2.0}
     observer.put(SALIENT[1].center, score=0.9)
-    assert redetection(outlook, here, 4, after_shutter=False).box == SALIENT[1]
+    after_some = replace(outlook, misses=4)
+    assert redetection(after_some, here, after_shutter=False).found == SALIENT[1]
     assert observer.measured == SALIENT[:3]
     assert observer.detected == observer.looked == [SALIENT[1]]
 
@@ -245,17 +247,17 @@ def test_sharpest_tile_is_looked_at_again_where_its_peak_is(redetect, observer):
     observer.put((33.0, 44.0), score=0.9)
     found = redetect(1)
     assert observer.looked == [EXPECTED.moved_to((33.0, 44.0))] == observer.detected[3:]
-    assert found.box == EXPECTED.moved_to((33.0, 44.0))
+    assert found.found == EXPECTED.moved_to((33.0, 44.0))
 
 
 def test_what_convinces_most_is_taken_for_the_target(redetect, observer, monitor):
     monitor.hurried = True
     observer.put(SALIENT[0].center, score=0.7)
     observer.put(SALIENT[1].center, score=0.8)
-    assert redetect().box == SALIENT[1]
+    assert redetect().found == SALIENT[1]
     observer.put(tiles()[0], score=0.9, sharpness=5.0)
     redetect.restart()
-    assert redetect().box.center == tiles()[0]
+    assert redetect().found.center == tiles()[0]
     # Whether the best one is a distractor is asked first, and no other one then.
     assert observer.asked == [tiles()[0]]
 
@@ -265,7 +267,7 @@ def test_next_best_is_taken_where_the_best_does_not_convince(redetect, observer,
     observer.put(SALIENT[0].center, score=0.7)
     observer.put(SALIENT[1].center, score=0.8)
     monitor.convincing.side_effect = lambda assessment: assessment.place == SALIENT[0].center
-    assert redetect().box == SALIENT[0]
+    assert redetect().found == SALIENT[0]
 
 
 def test_distractor_is_not_taken_for_the_target(redetect, observer, monitor, here):
@@ -273,7 +275,7 @@ def test_distractor_is_not_taken_for_the_target(redetect, observer, monitor, her
     observer.put(SALIENT[0].center, score=0.7)
     observer.put(SALIENT[1].center, score=0.8)
     observer.distractors = [SALIENT[1].center]
-    assert redetect().box == SALIENT[0]
+    assert redetect().found == SALIENT[0]
     observer.distractors.append(SALIENT[0].center)
     assert redetect() is here
 
@@ -290,6 +292,7 @@ def test_what_is_not_better_elsewhere_stays_here(redetect, observer, monitor, he
 def test_nothing_is_searched_where_nothing_is_asked_for(
         observer, monitor, salience, outlook, here, misses):
     redetection = Redetection(SearchConfig(0, 0), observer, monitor, outlook.view, LAST)
-    assert redetection(outlook, here, misses, after_shutter=True) is here
+    outlook = replace(outlook, misses=misses)
+    assert redetection(outlook, here, after_shutter=True) is here
     assert observer.detected == [] and observer.followed == [outlook]
     salience.candidates.assert_not_called()

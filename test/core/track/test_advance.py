@@ -67,12 +67,13 @@ class SameView(FrameView):
 
 
 def sighting(center, presence, peak=3.0, box=START):
-    """Return something seen at a place, of which the network is so sure."""
+    """Return something as large as a box seen at a place; so sure of it is the network."""
     displacement = tuple((c - r) / 80 for c, r in zip(center, REGION.center, strict=True))
     grid = np.arange(25.0).reshape(5, 5) * peak
     found = Detection(REGION, Peak(displacement[::-1], 0, peak, grid, np.array([peak, 1.0])),
                       [], np.zeros((3, 2)), 10.0)
-    return Sighting(box, found, Assessment(Evidence(10.0, 1.0, presence, 0.1), 1.0, 1.0, 0.8, 0.9),
+    seen = Assessment(Evidence(10.0, 1.0, presence, 0.1), 1.0, 1.0, 0.8, 0.9)
+    return Sighting(box.moved_to(center), found, seen,
                     Measurement(np.zeros((2, 2)), np.ones((2, 2)), presence))
 
 
@@ -110,7 +111,7 @@ def parts(monkeypatch):
     parts.monitor.judge.return_value, parts.monitor.start.return_value = BELIEVED, FIRST
     parts.observer.look.return_value, parts.redetection.return_value = Seen(HERE), THERE
     parts.prediction.expected.return_value, parts.prediction.misses = AHEAD, 0
-    parts.extent.side_effect = lambda box, measured: box
+    parts.extent.side_effect, parts.extent.settled = lambda box, measured: box, True
     parts.motion.box, parts.motion.velocity = MOVED, (2.0, -1.0)
     parts.motion.covariance, parts.motion.velocity_covariance = np.eye(4), np.eye(2)
     monkeypatch.setattr(track_module, 'box_covariance', lambda *of: of)
@@ -210,7 +211,8 @@ def test_what_is_not_believable_is_searched_elsewhere_and_that_is_judged(parts, 
     shown = frame()
     result = advance(track, shown)
     assert parts.redetection.call_args_list == [call(
-        Outlook(SameView(shown.image, RANGE), START, AHEAD, MOVED), HERE, 7, after_shutter=False)]
+        Outlook(SameView(shown.image, RANGE), START, AHEAD, MOVED, misses=7), HERE,
+        after_shutter=False)]
     parts.monitor.judge.assert_called_once_with(THERE.assessment)
     parts.detector.remember.assert_called_once_with(THERE.detection, pytest.approx((20, 60)))
     assert result.box.center == pytest.approx(THERE.detection.center)
@@ -405,6 +407,67 @@ def test_filter_learns_what_was_seen_and_trains_every_other_frame(parts, track):
         call(HERE.detection, pytest.approx((52, 36)))]
     track.learn()
     assert parts.detector.train.call_args_list == 2 * [call()]
+
+
+@pytest.fixture
+def entering(parts, track):
+    """Return a track of a target that comes in and is twice as large by now."""
+    parts.extent.settled = False
+    parts.extent.side_effect = lambda box, measured: box.scaled(2**0.5)
+    return track
+
+
+def test_target_that_has_outgrown_what_was_learned_is_learned_anew(parts, entering):
+    shown, later = frame(), sighting((52, 36), 2.5, peak=8.0).detection
+    parts.detector.return_value = later
+    result = advance(entering, shown)
+    view = SameView(shown.image, RANGE)
+    assert track_module.Detector.call_args == call(
+        CONFIG, 'backend', Networks(), view, result.box)
+    parts.observer.begin.assert_called_once_with(parts.detector, later)
+    parts.monitor.expect_anew.assert_called_once_with()
+    assert names(parts)[-4:] == [
+        'observer.begin', 'monitor.expect_anew', 'prediction.expected', 'detector.watch']
+    # The map of this frame is of the former filter, the next one of the new one.
+    assert result.confidence_map.max() == pytest.approx(HERE.detection.peak.grid.max() / 2)
+    parts.extent.side_effect = lambda box, measured: box
+    assert advance(entering, frame()).confidence_map.max() == pytest.approx(
+        HERE.detection.peak.grid.max() / 8)
+
+
+def test_new_detector_is_not_trained_on_what_the_former_one_remembered(parts, entering):
+    sizes = iter((1.0, 2**0.5))
+    parts.extent.side_effect = lambda box, measured: box.scaled(next(sizes))
+    for _ in range(2):
+        advance(entering, frame())
+    entering.learn()
+    parts.observer.begin.assert_called_once()
+    parts.detector.train.assert_not_called()
+
+
+@pytest.mark.parametrize('growth, deviation, settled, anew', [
+    (1.31, 0.9, False, True), (1.29, 0.9, False, False), (0.5, 0.1, False, False),
+    (1.31, 2.5, False, False), (1.31, 0.9, True, False)])
+def test_only_what_has_surely_grown_since_it_came_in_is_learned_anew(
+        parts, track, growth, deviation, settled, anew):
+    # The side of the grown box is 16 pixels: a deviation of 1.9 is not sure any more.
+    parts.extent.settled = settled
+    parts.extent.side_effect = lambda box, measured: box.scaled(growth**0.5)
+    measured = replace(HERE.measurement, deviations=np.full((2, 2), deviation))
+    parts.observer.look.return_value = Seen(replace(HERE, measurement=measured))
+    advance(track, frame())
+    assert parts.observer.begin.called is anew
+
+
+@pytest.mark.parametrize('verdict, measurement', [
+    (MISSED, HERE.measurement), (BELIEVED, None)], ids=['missed', 'not measured'])
+def test_what_is_not_seen_or_not_measured_is_not_learned_anew(
+        parts, entering, verdict, measurement):
+    parts.monitor.judge.return_value = verdict
+    parts.observer.look.return_value = Seen(
+        replace(HERE, measurement=measurement, found=HERE.found.scaled(2)))
+    advance(entering, frame())
+    parts.observer.begin.assert_not_called()
 
 
 def test_next_frame_learns_first_what_nobody_has_learned_before(parts, track):
