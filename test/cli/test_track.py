@@ -89,6 +89,23 @@ def test_several_targets_have_a_row_each(lmsco, tmp_path, scene_folder, scene, s
         assert {**row, 'id': '1'} == alone
 
 
+def test_ground_truth_is_that_of_the_first_target(lmsco, tmp_path, scene_folder, start, truth):
+    outcome = lmsco('track', scene_folder, '--init', start, '--init', '100,80,20,16',
+                    '--ground-truth', truth, '--frames', 3, '--output', tmp_path / 'run')
+    overlap = re.search(r'mean overlap (0\.\d+) over 3 frames', outcome.output)
+    assert overlap and float(overlap[1]) > 0.5
+
+
+@pytest.mark.parametrize('rows', [14, 15, 16])
+def test_ground_truth_of_another_length_is_told(lmsco, tmp_path, scene_folder, truth, rows):
+    lines = truth.read_text().splitlines()
+    (tmp_path / 'truth.txt').write_text('\n'.join((lines + lines)[:rows]))
+    outcome = lmsco('track', scene_folder, '--ground-truth', tmp_path / 'truth.txt',
+                    '--frames', 1, '--output', tmp_path / 'run')
+    assert outcome.exit_code == 0, outcome.output
+    assert (f'truth.txt has {rows} rows for 15 frames' in outcome.words) is (rows != 15)
+
+
 def test_start_is_a_later_frame(lmsco, tmp_path, scene_folder, scene, truth):
     box = ','.join(map(str, scene[6].box.as_tuple()))
     for name, arguments in (('given', ('--init', box)), ('known', ('--ground-truth', truth))):
@@ -98,8 +115,10 @@ def test_start_is_a_later_frame(lmsco, tmp_path, scene_folder, scene, truth):
         rows = rows_of(tmp_path / name)
         assert [int(row['frame']) for row in rows] == [6, 7, 8, 9]
         assert box_of(rows[0]).overlap(scene[6].box) > 0.99
-        assert np.mean([box_of(row).overlap(scene[int(row['frame'])].box) for row in rows]) > 0.5
-    assert 'over 4 frames' in outcome.output
+        overlap = np.mean([box_of(row).overlap(scene[int(row['frame'])].box) for row in rows])
+        assert overlap > 0.5
+    told = re.search(r'mean overlap (0\.\d+) over 4 frames', outcome.output)
+    assert told and float(told[1]) == pytest.approx(overlap, abs=0.01)
 
 
 def test_ground_truth_without_a_target_in_the_first_frame(lmsco, tmp_path, scene_folder, truth):
@@ -276,7 +295,7 @@ def test_images_are_no_place_for_results(lmsco, scene_folder, start):
 
 
 @pytest.mark.parametrize('box, is_told', [
-    ('-20,0,100,100', True), ('100,40,80,40', True), ('0,100,40,60', True),
+    ('-20,0,100,100', True), ('40,-20,60,80', True), ('100,40,80,40', True), ('0,100,40,60', True),
     ('0,0,160,128', False), ('20.1,60.3,8.7,26.1', False)])
 def test_start_box_that_reaches_beyond_the_image_is_told(lmsco, tmp_path, scene_folder, box,
                                                          is_told):
@@ -309,8 +328,8 @@ def test_start_on_nothing_is_told_once_and_stands_in_its_rows(lmsco, tmp_path, s
 class NotingTracker:
     """A tracker that follows nothing, and notes of each target what it is given for a frame."""
 
-    def __init__(self, box, notes):
-        self._box, self._notes = box, iter(notes)
+    def __init__(self, box, notes, state=TrackState.UNCERTAIN):
+        self._box, self._notes, self._state = box, iter(notes), state
         self.ids, self.results = (), {}
 
     def initialize(self, image, box, time):
@@ -319,7 +338,7 @@ class NotingTracker:
 
     def update(self, image, time):
         self.results = {
-            number: TrackResult(self._box, 0.5, TrackState.UNCERTAIN,
+            number: TrackResult(self._box, 0.5, self._state,
                                 np.zeros((4, 4), np.float32), self._box, note=note)
             for number, note in next(self._notes).items()}
         return self.results
@@ -340,6 +359,17 @@ def test_what_the_tracker_notes_is_told_when_it_appears(lmsco, tmp_path, scene_f
     assert outcome.exit_code == 0, outcome.output
     assert [line.removeprefix('note: ') for line in outcome.output.splitlines()
             if line.startswith('note: ')] == told
+
+
+@pytest.mark.parametrize('state, overlap', [
+    (TrackState.UNCERTAIN, '1.000'), (TrackState.LOST, '0.000')])
+def test_lost_target_overlaps_with_nothing(lmsco, tmp_path, scene_folder, scene, truth,
+                                           monkeypatch, state, overlap):
+    monkeypatch.setattr('lmsco_ros.core.MultiTracker',
+                        lambda settings: NotingTracker(scene[0].box, [{1: ''}], state))
+    outcome = lmsco('track', scene_folder, '--ground-truth', truth, '--frames', 1,
+                    '--output', tmp_path / 'run')
+    assert f'mean overlap {overlap} over 1 frames' in outcome.words
 
 
 def test_missing_source(lmsco, tmp_path):

@@ -311,6 +311,15 @@ def test_copies_go_on_with_all_targets(scene, duplicate):
     assert other.initialize(image, box_of(paths(3)[0])) == 4
 
 
+@pytest.mark.parametrize('duplicate', [
+    copy.deepcopy, lambda tracker: pickle.loads(pickle.dumps(tracker))])
+def test_copy_takes_no_more_threads_than_the_tracker(monkeypatch, duplicate):
+    tracker, limits = MultiTracker('hcs'), []
+    monkeypatch.setattr(targets_module, 'limit_threads', limits.append)
+    duplicate(tracker)
+    assert limits == [tracker.config.runtime.threads]
+
+
 def test_one_call_at_a_time(scene):
     tracker, image = MultiTracker('hcs'), frame(scene, *paths(0))
     tracker.initialize(image, box_of(paths(0)[0]))

@@ -211,6 +211,41 @@ def test_jump_continues_no_motion():
     assert state.velocity == pytest.approx((2, 1), rel=0.1)
 
 
+@pytest.mark.parametrize('deviations, goes_on', [(4.9, True), (5.1, False)])
+def test_motion_ends_five_deviations_from_where_it_was_expected(deviations, goes_on):
+    state = followed()
+    state.predict(1.0)
+    x, y = state.box.center
+    spread = (whole(state)[1] + np.pad(EXACT, (0, 2)))[0, 0]**0.5
+    state.measure(START.moved_to((x + deviations * spread, y)), EXACT)
+    assert (state.velocity != (0, 0)) is goes_on
+
+
+def test_motion_goes_on_where_the_size_alone_jumps():
+    state = followed()
+    state.predict(1.0)
+    state.measure(state.box.scaled(2.0), EXACT)
+    assert state.velocity == pytest.approx((1.5, -0.5), rel=0.05)
+
+
+def test_size_is_given_to_two_percent_and_grows_unsure_by_half_a_percent_in_a_frame():
+    state = TargetState(START)
+    for variance in (0.02**2, 0.02**2 + 16 * 0.005**2):
+        np.testing.assert_allclose((state.covariance - LASTING)[2:, 2:],
+                                   variance * np.diag([20**2, 10**2]), atol=1e-12)
+        state.predict(16.0)
+
+
+def test_after_a_cut_the_size_tells_nothing_of_the_place():
+    tied = EXACT.copy()
+    tied[0, 2] = tied[2, 0] = 0.01
+    state = followed(covariance=tied)
+    assert whole(state)[1][0, 2]
+    state.forget_place((640, 480))
+    for one, other in ((slice(0, 2), slice(2, 6)), (slice(4, 6), slice(0, 4))):
+        assert not whole(state)[1][one, other].any() and not whole(state)[1][other, one].any()
+
+
 def test_after_a_cut_the_target_may_be_anywhere_at_rest():
     state = followed()
     before = state.box
@@ -274,6 +309,10 @@ def test_times_are_steps_of_a_camera_of_30_frames_a_second():
     assert clock.step(1.7e9 + 0.1) == pytest.approx(3.0, rel=1e-5)
     assert clock.step(1.7e9 + 0.2) == pytest.approx(3.0, rel=1e-5)
     assert clock.rate == 30.0
+
+
+def test_frames_of_a_faster_camera_are_parts_of_a_step():
+    assert FrameClock(1.0).step(1.0 + 1 / 64) == 30 / 64
 
 
 def test_time_that_does_not_go_on_is_one_frame():

@@ -42,6 +42,20 @@ def test_state_round_trip(state):
     np.testing.assert_array_equal(back.velocity_covariance, state.velocity_covariance)
 
 
+def test_largest_number_of_a_target_survives():
+    largest = State(**vars(STATE) | {'track_id': 2**32 - 1})
+    assert state_from_odometry(odometry_from_state(largest)).track_id == 2**32 - 1
+
+
+def test_state_does_not_change_with_its_message():
+    message = odometry_from_state(STATE)
+    state = state_from_odometry(message)
+    message.pose.covariance[:] = 0.0
+    message.twist.covariance[:] = 0.0
+    np.testing.assert_array_equal(state.covariance, STATE.covariance)
+    np.testing.assert_array_equal(state.velocity_covariance, STATE.velocity_covariance)
+
+
 def test_every_number_is_in_its_place():
     message = odometry_from_state(STATE, Header(frame_id='thermal'))
     assert (message.header.frame_id, message.child_frame_id) == ('thermal', 'target_7')

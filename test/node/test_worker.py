@@ -595,6 +595,17 @@ def test_start_that_waits_is_forgotten_by_a_reset_while_its_image_is_read(bench)
     assert b.wait(2).phase is Phase.IDLE
 
 
+def test_reset_while_an_image_is_read_holds_for_that_image(bench):
+    b = bench()
+    b.worker.initialize(BOX)
+    b.frames([0])
+    reset = Pixels(np.ones((2, 3)))
+    reset.read = lambda read=reset.read: (b.worker.reset(), read())[1]
+    b.worker.submit(PendingFrame(reset, SECOND, time.monotonic()))
+    assert b.wait(2).phase is Phase.IDLE and b.worker.image_size == (3, 2)
+    assert b.tracker.calls == [('initialize', 0)]
+
+
 @pytest.mark.parametrize('error', [MemoryError(), SystemExit(3), RuntimeError('no publisher')])
 def test_thread_survives_whatever_delivering_raises(bench, error):
     b = bench()
@@ -827,6 +838,31 @@ def test_late_target_that_is_replaced_does_not_go_on_catching_up(bench):
     b.frame(6)
     outcome = b.wait_for(lambda outcome: outcome.frame.stamp == 6 * SECOND)
     assert boxes(outcome) == {2: 2}
+
+
+def test_late_target_that_is_dropped_goes_through_no_more_frames(bench):
+    b = bench(most=2, drop_after=1.5)
+    b.worker.initialize(at(1))
+    b.frames(range(8))
+    before = len(b.outcomes)
+    b.tracker.state = TrackState.LOST
+    b.worker.initialize(at(2), 2 * SECOND)
+    assert b.wait(before + 3).dropped == (2,)
+    b.tracker.state = TrackState.TRACKING
+    b.frames([8])
+    assert [outcome.frame.stamp // SECOND for outcome in b.outcomes[before:]] == [2, 3, 4, 8]
+
+
+def test_outcome_of_a_late_target_speaks_of_it_whichever_is_selected(bench):
+    b = bench(most=2)
+    b.worker.initialize(at(1))
+    b.frames(range(5))
+    before = len(b.outcomes)
+    b.tracker.on_learn = lambda: b.worker.select(1)
+    b.worker.initialize(at(2), 2 * SECOND)
+    b.wait(before + 3)
+    assert b.worker.track_id == 1
+    assert [outcome.track_id for outcome in b.outcomes[before:]] == [2, 2, 2]
 
 
 def test_waiting_starts_are_as_many_as_there_may_be_targets(bench):

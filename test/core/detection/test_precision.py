@@ -18,6 +18,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.stats import norm
 
 from lmsco_ros.core import BoundingBox, TrackerConfig
 from lmsco_ros.core.backend import select_backend
@@ -95,6 +96,28 @@ def test_second_peak_makes_the_way_to_it_uncertain(way):
     # The lower it is, the less it counts.
     lower = detected(hill(place, (2, 2)) + hill(other, (2, 2), 0.5))
     assert np.trace(center_covariance(lower, TARGET)) < 0.1 * np.trace(told)
+
+
+def test_way_to_another_peak_is_weighted_by_the_chance_that_errors_changed_their_order():
+    found = replace(detected(hill((20, 20), (2, 2))), sharpness=10.0)
+    grid = np.full((SIZE, SIZE), 0.5)
+    alone = replace(found, peak=replace(found.peak, value=1.0, grid=grid))
+    grid = grid.copy()
+    grid[20, 28] = 0.95
+    beside = replace(alone, peak=replace(alone.peak, grid=grid))
+    told = center_covariance(beside, TARGET) - center_covariance(alone, TARGET)
+    # Five cells around the peak, half of the target, are its own.
+    mean = 0.5 + 0.45 / (SIZE**2 - 11**2)
+    chance = norm.cdf(-(1 - 0.95) / (2**0.5 * (1 - mean) / 10))
+    np.testing.assert_allclose(told, np.diag([chance * (8 * SIDE / SIZE)**2, 0]), rtol=1e-6,
+                               atol=1e-6)
+
+
+def test_height_of_the_score_says_nothing():
+    score = hill((20, 22), (3, 2)) + hill((8, 30), (2, 2), 0.9)
+    one, other = (center_covariance(detected(height * score, noise=height * 0.02), TARGET)
+                  for height in (1, 3))
+    np.testing.assert_allclose(other, one, rtol=1e-6, atol=1e-9)
 
 
 def test_peak_within_the_target_is_no_other():

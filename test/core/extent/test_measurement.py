@@ -93,6 +93,24 @@ def test_crossed_edges_are_put_in_order(frame):
     assert min(measured.box.size) >= 0
 
 
+def measured_edges(frame, edges):
+    """Return the edges that are made of those that the network tells."""
+    half = 1.5 * BOX.area**0.5
+    told = (np.array(edges) - [[60, 100], [50, 74]]).T.ravel() / half
+    network = FakeNetwork([*told, *np.zeros(5)])
+    return ExtentMeter.marked(network, frame, BOX)(frame, BOX).edges
+
+
+def test_crossed_edges_change_their_places(frame):
+    edges = measured_edges(frame, [[100, 60], [50, 74]])
+    np.testing.assert_allclose(edges, [[60, 100], [50, 74]])
+
+
+def test_edges_at_the_same_place_leave_one_pixel_between_them(frame):
+    edges = measured_edges(frame, [[80, 80], [62.25, 61.75]])
+    np.testing.assert_allclose(edges, [[79.5, 80.5], [61.5, 62.5]])
+
+
 def test_network_knows_the_sizes_of_both_boxes(frame):
     network = FakeNetwork()
     ExtentMeter.marked(network, frame, BOX)(frame, BOX.scaled(2.0))

@@ -77,6 +77,56 @@ def test_noise_is_nothing(network, point):
         extent_at(network, view([], noise=8.0), point)
 
 
+class FakeNetwork:
+    """Answers by the side of the square that it is asked about, and keeps these sides."""
+
+    size, context, nothing = 8, 3.0, None
+
+    def __init__(self, answer):
+        self.answer, self.sides = answer, []
+
+    def reference(self, encoding):
+        """Return nothing, since nothing was marked."""
+        return encoding
+
+    def answers(self, questions):
+        """Return the answer to each question."""
+        asked = [2**side for _, _, (_, side) in questions]
+        self.sides += asked
+        return [self.answer(side) for side in asked]
+
+
+def answer(presence=1.0, deviation=1e-3, right=0.0):
+    """Return that the square is right, or lies so many halves of the patch further right."""
+    return np.array([right, 0, right, 0, *np.log(np.full(4, deviation)), presence])
+
+
+def test_squares_grow_to_a_part_of_the_longer_side_of_the_image():
+    network = FakeNetwork(lambda side: answer())
+    extent_at(network, view([]), (100, 80))
+    # Up to 0.7 * 200; each is measured, and three times more where it was measured.
+    assert sorted(network.sides) == pytest.approx(
+        [8 * 2**(n / 2) for n in range(9) for _ in range(4)])
+
+
+def test_what_is_sure_is_taken_before_what_is_a_little_more_present():
+    # Three log-odds, less ten for 1.5 * sqrt(2) * 0.2 = 0.42 of the side.
+    network = FakeNetwork(lambda side: answer(3.0, 0.2) if side < 20 else answer())
+    assert extent_at(network, view([]), (100, 80)).size == pytest.approx(2 * (8 * 2**1.5,))
+
+
+def test_what_does_not_hold_the_point_is_not_taken_however_present():
+    network = FakeNetwork(lambda side: answer(9.0, right=1.0) if side < 10 else answer())
+    found = extent_at(network, view([]), (60, 60))
+    assert found.center == pytest.approx((60, 60)) and found.width > 10
+
+
+@pytest.mark.parametrize('point', [(0, 0), (200, 160)])
+def test_corner_is_in_the_image(point):
+    found = extent_at(FakeNetwork(lambda side: answer()), view([]), point)
+    assert found.contains(point) and found.size == pytest.approx((4, 4))
+
+
 @pytest.mark.parametrize('point', [(1, 2, 3), 'ab', None, 7, ('a', 'b'), (10**400, 1)])
 def test_what_is_no_point_is_refused(network, point):
     with pytest.raises(PointError, match=r'expected \(x, y\): two numbers'):

@@ -258,6 +258,20 @@ def test_a_warm_region_is_a_picture():
     assert credible_values(image, probe, 60).size >= probe.size - 2
 
 
+def test_pixels_without_a_value_are_left_out():
+    image = scene().astype(np.float32)
+    image[20:30, 40:60] = np.nan
+    values = credible_values(image, take_probe(image), 600)
+    np.testing.assert_array_equal(values, image[np.isfinite(image)])
+
+
+def test_rows_that_change_slowly_are_a_picture_however_wide_their_range():
+    image = np.full(SHAPE, 7000.0, np.float32)
+    # In the lowest row of the bar each pixel differs from the one below by 3000 on the mean.
+    image[40:44] += np.linspace(0, 6000, SHAPE[1], dtype=np.float32)
+    assert credible_values(image, take_probe(image), 600).size >= image.size - 2
+
+
 def test_nothing_but_noise_is_still_a_range(rng):
     noise = rng.integers(0, 65536, SHAPE).astype(np.uint16)
     observed = AutomaticGain(IntensityConfig()).observe(noise)

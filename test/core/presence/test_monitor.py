@@ -454,6 +454,48 @@ def test_part_of_the_target_is_enough_shortly_after_a_cut(monkeypatch, monitor):
     assert not convincing(monitor, part)
 
 
+def test_part_of_what_did_not_stand_out_is_not_enough_after_a_cut(monkeypatch):
+    doubted, sure = PresenceMonitor(CONFIG), PresenceMonitor(CONFIG)
+    doubted.start(evidence(10.0, presence=-1.0, vagueness=0.4))
+    sure.start(CLEAR)
+    part = at_score(sure, 0.86)
+    unsure = replace(trust_module.MEASURED, constant=trust_module.MEASURED.constant - 3)
+    monkeypatch.setattr(trust_module, 'MEASURED', unsure)
+    for monitor in (doubted, sure):
+        monitor.note_cut()
+    assert convincing(sure, part) and not convincing(doubted, part)
+
+
+def test_what_did_not_stand_out_has_to_convince_where_it_was_after_a_cut():
+    doubted, sure = PresenceMonitor(CONFIG), PresenceMonitor(CONFIG)
+    doubted.start(evidence(10.0, presence=-1.0, vagueness=0.4))
+    sure.start(CLEAR)
+    likely = evidence(10.0, 0.1)
+    for monitor in (doubted, sure):
+        monitor.note_cut()
+        assert monitor.assess(likely).belief > 0.5 and not convincing(monitor, likely)
+    assert believable(sure, likely) and not believable(doubted, likely)
+
+
+def test_after_a_cut_two_frames_have_to_agree_on_what_has_moved(monitor):
+    monitor.note_cut()
+    first = judge(monitor, replace(at_score(monitor, 0.82), jump=1.1))
+    assert first.promising and not first.believed
+
+
+def test_what_overwhelms_out_of_its_region_has_to_convince_as_well(monitor):
+    far = evidence(10.0, 0.29, presence=20.0, jump=2.6)
+    assert monitor.assess(far).score > 0.85 and not convincing(monitor, far)
+    assert not believable(monitor, far)
+
+
+def test_score_that_just_overwhelms_is_enough():
+    score = first_score(CLEAR)
+    far = replace(CLEAR, jump=2.6)
+    assert 0.85 < score < 1 and judge(with_thresholds(found=score), far).believed
+    assert not judge(with_thresholds(found=float(np.nextafter(score, 1))), far).believed
+
+
 def test_found_again_is_learned_from_after_probation(lost):
     judge(lost, CLEAR)
     states = [judge(lost, CLEAR).state for _ in range(6)]
@@ -568,6 +610,15 @@ def test_doubted_start_is_lost_by_its_score_until_it_stands_out(monkeypatch):
         monitor.start(first)
         assert monitor.assess(nothing).score < 0.2
         assert [judge(monitor, nothing).state for _ in range(3)] == states
+
+
+def test_doubted_start_goes_on_with_a_score_of_a_fifth(monkeypatch):
+    monkeypatch.setattr(trust_module, 'BELIEF_MEASURED', TrustModel(0.0, 0.0, 0.0, 0.0, 3.0))
+    monitor = PresenceMonitor(CONFIG)
+    monitor.start(evidence(10.0, presence=-1.0, vagueness=0.4))
+    seen = monitor.assess(CLEAR)
+    assert monitor.believable(replace(seen, score=0.21))
+    assert not monitor.believable(replace(seen, score=0.19))
 
 
 def test_first_frame_has_to_show_a_little_more_than_a_later_one(monitor):

@@ -50,6 +50,12 @@ def test_target_that_has_become_small_is_expected_small():
     assert course.expected(IMAGE).size == pytest.approx((19, 30))
 
 
+def test_lost_target_is_expected_in_a_size_of_thirty_frames_ago():
+    course = vanishing([40, 20] + 29 * [19])
+    course.lost()
+    assert course.expected(IMAGE).size == pytest.approx((20, 30))
+
+
 def test_lost_target_that_is_found_is_expected_as_it_is_found():
     course = vanishing([20, 5])
     course.lost()

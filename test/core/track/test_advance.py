@@ -597,6 +597,15 @@ def test_what_is_promising_is_looked_for_where_it_was_and_in_its_size(parts, tra
     assert parts.observer.look.call_args.args[0].expected == AHEAD
 
 
+def test_size_before_it_vanished_is_taken_when_the_target_is_lost_and_no_sooner(parts, track):
+    parts.observer.look.return_value = Seen(sighting((52, 36), 2.5, box=START.scaled(0.5)))
+    advance(track, frame())
+    for verdict, size in ((MISSED, (10, 5)), (replace(MISSED, state=TrackState.LOST), (20, 10))):
+        parts.monitor.judge.return_value = verdict
+        advance(track, frame())
+        assert parts.prediction.expected.call_args.args[0].size == pytest.approx(size)
+
+
 def test_promise_of_another_view_is_none(parts, track):
     parts.monitor.judge.return_value = PROMISING
     advance(track, frame())
