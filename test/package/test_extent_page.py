@@ -23,7 +23,9 @@ import sys
 
 import pytest
 
+from lmsco_ros.core import track
 from lmsco_ros.core.extent import fusion
+from lmsco_ros.core.imaging import regions
 from lmsco_ros.core.presence import trust
 from lmsco_ros.core.weights.registry import find_source
 from training.extent.bodies import PLANS
@@ -109,8 +111,9 @@ def test_constants_of_the_fusion_are_those_of_the_code():
         'drawn': fusion._DRAWN, 'drawn pixels': fusion._DRAWN_PIXELS, 'found': fusion._FOUND,
         'change': fusion._CHANGE,
         'border': fusion._CHANGE_AT_BORDER, 'convention': fusion._CONVENTION,
-        'settling': fusion._SETTLING, 'anchoring': fusion._ANCHORING}
-    assert f'{fusion._BORDER_PIXELS} pixels away' in PAGE
+        'settling': fusion._SETTLING, 'anchoring': fusion._ANCHORING,
+        'outgrown': track._OUTGROWN, 'sure': track._SURE}
+    assert f'{regions._BORDER_PIXELS} pixels away' in PAGE
     assert f'at least {fusion._SMALLEST_SIDE:g} pixels' in PAGE
 
 
