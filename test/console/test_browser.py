@@ -20,8 +20,8 @@ Needs Chromium, its driver and selenium, and is skipped with the reason where on
 
 import contextlib
 import json
-import os
 from operator import itemgetter
+import os
 from pathlib import Path
 import queue
 import re
