@@ -14,7 +14,6 @@
 
 """Targets that are marked while the border of the image cuts them."""
 
-import cv2
 import numpy as np
 import pytest
 
@@ -25,44 +24,31 @@ from lmsco_ros.core.imaging.regions import visible_part
 IMAGE_SIZE = (256, 192)
 
 
-def walker_at(places):
-    """Yield images of a walker before a noisy ground, with the box of what is in view of it."""
-    rng = np.random.default_rng(0)
-    ground = cv2.GaussianBlur(rng.normal(0, 1, IMAGE_SIZE[::-1]), (0, 0), 6)
-    ground = 7300 + 120 * ground / ground.std()
-    y, x = np.mgrid[:IMAGE_SIZE[1], :IMAGE_SIZE[0]]
-    for left, top in places:
-        image = ground.copy()
-        image[np.hypot((x - left - 9) / 8.5, (y - top - 26) / 16) < 1] += 400
-        image[np.hypot((x - left - 9) / 5, (y - top - 6) / 6) < 1] += 500
-        image = cv2.GaussianBlur(image, (0, 0), 0.8) + rng.normal(0, 8, image.shape)
-        yield image.astype(np.uint16), visible_part(BoundingBox(left, top, 18, 42), IMAGE_SIZE)
+def visible(place):
+    """Return what is in view of a walker at a place (left, top)."""
+    return visible_part(BoundingBox(*place, 18, 42), IMAGE_SIZE)
 
 
 @pytest.mark.parametrize('start, step, shown', [
     ((-12, 70), (1.2, 0.2), (6, 42)), ((-10, 70), (0.5, 0.1), (8, 42)),
     ((100, 180), (0.4, -1.2), (18, 12))], ids=['side', 'slowly', 'below'])
-def test_whole_walker_is_followed_once_it_has_come_in(start, step, shown):
+def test_whole_walker_is_followed_once_it_has_come_in(walker_images, start, step, shown):
     """The tracker is started on a third of it, or less; the size of that covers a third."""
-    frames = walker_at([np.add(start, np.multiply(step, n)) for n in range(80)])
+    places = [np.add(start, np.multiply(step, n)) for n in range(80)]
+    images, boxes = walker_images(places), [visible(place) for place in places]
+    assert boxes[0].size == pytest.approx(shown) and boxes[-1].size == (18, 42)
     tracker = LMSCOTracker()
-    image, visible = next(frames)
-    assert visible.size == pytest.approx(shown)
-    tracker.initialize(image, visible)
-    overlaps = []
-    for image, visible in frames:
-        result = tracker.update(image)
-        overlaps.append(result.box.overlap(visible))
-        assert result.state is not TrackState.LOST
-    assert visible.size == (18, 42)
-    assert np.mean(overlaps[-20:]) > 0.65
+    tracker.initialize(next(images), boxes[0])
+    results = [tracker.update(image) for image in images]
+    assert TrackState.LOST not in [result.state for result in results]
+    overlaps = [result.box.overlap(box)
+                for result, box in zip(results[-20:], boxes[-20:], strict=True)]
+    assert np.mean(overlaps) > 0.65
 
 
-def test_tracker_that_measures_nothing_keeps_the_size_of_the_part():
+def test_tracker_that_measures_nothing_keeps_the_size_of_the_part(walker_images):
     """Nothing would tell it where the rest ends."""
-    frames = walker_at([(-10 + 0.5 * n, 70) for n in range(30)])
+    images = walker_images([(-10 + 0.5 * n, 70) for n in range(30)])
     tracker = LMSCOTracker(TrackerConfig(extent=ExtentConfig(network='')))
-    image, visible = next(frames)
-    tracker.initialize(image, visible)
-    for image, _ in frames:
-        assert tracker.update(image).box.width <= visible.width + 1e-9
+    tracker.initialize(next(images), visible((-10, 70)))
+    assert all(tracker.update(image).box.width <= 8 + 1e-9 for image in images)

@@ -14,7 +14,6 @@
 
 """What is said while the target is away, beside another one, or after a closed shutter."""
 
-import cv2
 import numpy as np
 import pytest
 
@@ -104,31 +103,17 @@ def test_target_leaves_the_image_and_comes_back(scene):
     assert back[-1].box.center == pytest.approx((x[0], START[1]), abs=1.5)
 
 
-def walker_behind_a_wall(speed, frames):
-    """Yield images of a walker who goes behind a wall and comes out, with the left edge of it."""
-    rng = np.random.default_rng(0)
-    ground = cv2.GaussianBlur(rng.normal(0, 1, (192, 256)), (0, 0), 6)
-    ground = 7300 + 120 * ground / ground.std()
-    y, x = np.mgrid[:192, :256]
-    for n in range(frames):
-        left, image = 40 + speed * n, ground.copy()
-        image[np.hypot((x - left - 9) / 8.5, (y - 105) / 16) < 1] += 400
-        image[np.hypot((x - left - 9) / 5, (y - 85) / 6) < 1] += 500
-        image[60:130, 110:155] = 7250
-        image = cv2.GaussianBlur(image, (0, 0), 0.8) + rng.normal(0, 8, image.shape)
-        yield image.astype(np.uint16), left
-
-
 @pytest.mark.parametrize('speed', [0.7, 1.5])
-def test_walker_who_vanishes_slowly_behind_a_wall_is_found_in_the_old_size(speed):
-    frames = walker_behind_a_wall(speed, round(180 / speed))
+def test_walker_who_vanishes_slowly_behind_a_wall_is_found_in_the_old_size(walker_images, speed):
+    places = [(40 + speed * n, 79) for n in range(round(180 / speed))]
+    images = walker_images(places, wall=(110, 60, 155, 130))
     tracker, states = LMSCOTracker(), []
-    tracker.initialize(next(frames)[0], BoundingBox(40, 79, 18, 41))
-    for image, left in frames:
+    tracker.initialize(next(images), BoundingBox(40, 79, 18, 41))
+    for image in images:
         result = tracker.update(image)
         states.append(result.state)
     assert TrackState.LOST in states and states[-1] is TrackState.TRACKING
-    assert result.box.overlap(BoundingBox(left, 79, 18, 41)) > 0.7
+    assert result.box.overlap(BoundingBox(*places[-1], 18, 41)) > 0.7
 
 
 def test_target_that_got_away_behind_the_shutter_is_found_with_the_second_frame(scene):
