@@ -15,7 +15,8 @@
 """
 Compare configurations over sequences and over starts that are off by chance, with intervals.
 
-    python -m benchmarks.jittered_starts DATASET --trackers benchmarks/comparisons/backbones.yaml
+    python -m benchmarks.jittered_starts DATASET [DATASET ...]
+        --trackers benchmarks/comparisons/backbones.yaml
         [--split FILE --part train] [--only PATTERN ...] [--challenge NAME] [--frames 60]
         [--starts 3] [--each]
 
@@ -129,7 +130,8 @@ def read_trackers(path: Path) -> dict[str, TrackerConfig]:
 
 def chosen_sequences(options: argparse.Namespace) -> list[TrackingSequence]:
     """Return the sequences that the command line asks for, cut and with their challenge."""
-    sequences = list(scan_dataset(options.dataset).sequences)
+    sequences = [sequence for folder in options.datasets
+                 for sequence in scan_dataset(folder).sequences]
     if options.split is not None:
         sequences = load_split(options.split).select(options.part, sequences)
     if options.only:
@@ -235,7 +237,7 @@ def report(outcomes: Mapping[str, Sequence[Outcome]], sequences: Sequence[Tracki
 def sequence_options(description: str) -> argparse.ArgumentParser:
     """Return a parser that knows which sequences are meant, and how many starts."""
     parser = argparse.ArgumentParser(description=description)
-    parser.add_argument('dataset', type=Path)
+    parser.add_argument('datasets', type=Path, nargs='+', metavar='DATASET')
     parser.add_argument('--split', type=Path)
     parser.add_argument('--part', default='train')
     parser.add_argument('--only', nargs='+', metavar='PATTERN')

@@ -192,6 +192,9 @@ def test_command_writes_its_table_into_a_page(tmp_path, capsys):
     assert rows['margin'][3] == rows['ridge'][3] == '0 of 2'
     main([*options, '--each', '--only', '*/walk'])
     assert '`group/walk`' in capsys.readouterr().out
+    # Several data sets are one comparison.
+    main([str(tmp_path / 'data'), *options])
+    assert {row[3] for row in cells(capsys.readouterr().out).values()} == {'0 of 4'}
     with pytest.raises(SystemExit, match='no sequence is left'):
         main([*options, '--only', 'nothing'])
     # Too short for this challenge.
