@@ -108,10 +108,19 @@ def has_jumped(ground_truth: Array) -> npt.NDArray[np.bool_]:
 
     It has when its center moves by more than two of its sizes from one frame to the next.
     """
-    centers = ground_truth[:, :2] + ground_truth[:, 2:] / 2
+    return steps_in_sizes(ground_truth) > _JUMP_SIZES
+
+
+def steps_in_sizes(boxes: Array) -> Array:
+    """
+    Return for each row, shape (n,), how far the center has moved since the row before.
+
+    The unit is the size of the box before, the root of its area. The first row has not moved; it
+    is NaN where one of the two boxes is absent.
+    """
+    centers = boxes[:, :2] + boxes[:, 2:] / 2
     steps = np.linalg.norm(np.diff(centers, axis=0), axis=1)
-    sizes = np.sqrt(np.prod(ground_truth[:-1, 2:], axis=1))
-    return np.append(False, steps > _JUMP_SIZES * sizes)
+    return np.append(0.0, steps / np.sqrt(np.prod(boxes[:-1, 2:], axis=1)))
 
 
 def is_absent(boxes: Array) -> npt.NDArray[np.bool_]:

@@ -28,12 +28,13 @@ from lmsco_ros.evaluation.published import (
 from lmsco_ros.evaluation.report.conditions import conditions, extent, problems
 from lmsco_ros.evaluation.report.formatting import spread_warning
 from lmsco_ros.evaluation.report.tables import (
-    absence_table, anchor_table, benchmark_table, border_table, Cell, confidence_table,
-    consistency_table, difference_rows, DifferenceRow, one_pass_table, score_table, start_table,
-    supervised_table, Table)
+    absence_table, anchor_table, attribute_table, benchmark_table, border_table, Cell,
+    confidence_table, consistency_table, difference_rows, DifferenceRow, one_pass_table,
+    score_table, start_table, supervised_table, Table)
 from lmsco_ros.evaluation.run_file import EvaluationRun
 from lmsco_ros.evaluation.split import Split
 from lmsco_ros.evaluation.summaries.anchors import anchor_interval, summarize_anchors
+from lmsco_ros.evaluation.summaries.attributes import attribute_source, summarize_attributes
 from lmsco_ros.evaluation.summaries.benchmarks import summarize_benchmarks
 from lmsco_ros.evaluation.summaries.confidence import summarize_confidence
 from lmsco_ros.evaluation.summaries.consistency import summarize_consistency
@@ -70,6 +71,10 @@ of at most .2 target sizes (LaSOT). State accuracy is the mean of the overlap wh
 is there, and of 1 where it is not and the tracker says so (Anti-UAV). MSR and MPR, where there
 are two channels, are success AUC and precision by the boxes of that one that the tracker is
 nearer to (RGBT234).
+"""
+
+_ATTRIBUTE_NOTE = """\
+Mean overlap on the frames of each attribute, pooled over sequences, with the number of frames.
 """
 
 _SUPERVISED_NOTE = """\
@@ -215,6 +220,8 @@ def _one_pass(run: EvaluationRun, published: Sequence[PublishedFile]) -> list[st
             *([f'{note}\n'] if note else []),
             _comparison(difference_rows(differences(aucs, True), 3), 'success AUC'),
             _BENCHMARK_NOTE, _markdown(benchmark_table(summarize_benchmarks(run))),
+            _ATTRIBUTE_NOTE, f'{attribute_source(run)}\n',
+            _markdown(attribute_table(summarize_attributes(run))),
             *_confidence(run)]
 
 

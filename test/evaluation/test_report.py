@@ -191,6 +191,7 @@ def test_results_page_has_a_table_for_each_kind_of_scene(tmp_path, runs):
     assert [line for line in plain.splitlines() if line.startswith('## ')] == [
         '## All sequences', '## Conditions']
     assert '| csrt | ' in text and 'Abacus 3000' in text
+    assert text.count('| tracker | camera motion | empty |') == 3
     assert str(tmp_path) not in text
     again = read_run(tmp_path, 'vot')
     assert again.traces['lazy'][0].failures == (12,)

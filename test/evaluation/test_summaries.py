@@ -20,8 +20,9 @@ import math
 import numpy as np
 import pytest
 
+from lmsco_ros.evaluation.protocols.per_attribute import box_attributes
 from lmsco_ros.evaluation.run_file import EvaluationRun, SequenceInfo
-from lmsco_ros.evaluation.summaries.attributes import attribute_names, summarize_attributes
+from lmsco_ros.evaluation.summaries.attributes import attribute_source, summarize_attributes
 from lmsco_ros.evaluation.summaries.confidence import confidence_parts, summarize_confidence
 from lmsco_ros.evaluation.summaries.consistency import consistency_parts, summarize_consistency
 from lmsco_ros.evaluation.summaries.differences import differences, reference_of
@@ -113,12 +114,37 @@ def test_attributes_pool_annotated_sequences_only():
     flags = {'occlusion': np.array([False, True]), 'empty': np.array([True, False])}
     run = EvaluationRun('ope', (sequence('a', 2, flags), sequence('b', 2)), {
         'one': (trace([1, .5]), trace([.1, .1]))})
-    assert attribute_names(run) == ('occlusion', 'empty')
     figures = summarize_attributes(run)['one']
+    assert list(figures) == ['occlusion', 'empty'] and 'annotated' in attribute_source(run)
     assert figures['occlusion'].mean_overlap == pytest.approx(.5)
     assert figures['empty'].mean_overlap == pytest.approx(1)
-    assert summarize_attributes(EvaluationRun('ope', (sequence('b', 2),),
-                                              {'one': (trace([1, 1]),)})) == {}
+
+
+def test_true_boxes_tell_attributes_where_nobody_annotated_any():
+    run = EvaluationRun('ope', (sequence('a', 2), sequence('b', 2)), {
+        'one': (trace([1, .5]), trace([.1, .4]))})
+    figures = summarize_attributes(run)['one']
+    assert list(figures) == ['aspect_ratio_change', 'fast_motion', 'low_resolution',
+                             'scale_variation', 'empty']
+    assert figures['low_resolution'].frames == 4
+    assert figures['low_resolution'].mean_overlap == pytest.approx(.5)
+    assert figures['empty'].frames == 0 and 'LaSOT' in attribute_source(run)
+
+
+def test_attributes_by_boxes():
+    boxes = np.array([
+        [0, 0, 40, 40],    # nothing
+        [40, 0, 40, 40],   # as far as it is large
+        [81, 0, 40, 40],   # farther
+        [81, 0, 57, 57],   # 2.03 times the area
+        [np.nan] * 4,
+        [0, 0, 56, 28],    # width over height 2, area .98
+        [0, 0, 60, 29],    # above 2
+        [0, 0, 20, 39]])   # .4875 of the area, 780 pixels, .51 wide for its height
+    flags = {name: np.flatnonzero(values).tolist()
+             for name, values in box_attributes(boxes).items()}
+    assert flags == {'fast_motion': [2], 'scale_variation': [3, 7], 'aspect_ratio_change': [6],
+                     'low_resolution': [7], 'empty': [0, 1, 5]}
 
 
 def test_confidence_pools_sequences():

@@ -22,9 +22,11 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from lmsco_ros.evaluation.geometry import Array
+from lmsco_ros.evaluation.geometry import Array, steps_in_sizes
 
 Flags = npt.NDArray[np.bool_]
+
+_LOW_RESOLUTION = 1000.0
 
 
 @dataclass(frozen=True)
@@ -46,6 +48,42 @@ class AttributeFigures:
     frames: int
     mean_overlap: float
     failures: int
+
+
+def box_attributes(truth: Array) -> dict[str, Flags]:
+    """
+    Return what the true boxes themselves tell of each frame.
+
+    The limits are those by which LaSOT (Fan et al., CVPR 2019) gives attributes to sequences.
+
+    Parameters
+    ----------
+    truth : ndarray, shape (n, 4)
+        True boxes (x, y, width, height) in pixels; NaN where the target is absent.
+
+    Returns
+    -------
+    dict of str to ndarray, shape (n,), bool
+        `fast_motion`: the center has moved by more than the target's size since the frame before.
+        `scale_variation`: the area, over that of the first box, is outside [1/2, 2].
+        `aspect_ratio_change`: so is width over height. `low_resolution`: the area is below 1000
+        pixels. `empty`: nothing of these. Where the target is absent, all are False.
+
+    """
+    present = np.isfinite(truth).all(axis=1)
+    first = truth[present.argmax()]
+    area, shape = np.prod(truth[:, 2:], axis=1), truth[:, 2] / truth[:, 3]
+    flags = {
+        'fast_motion': steps_in_sizes(truth) > 1,
+        'scale_variation': _has_changed(area / np.prod(first[2:])),
+        'aspect_ratio_change': _has_changed(shape / (first[2] / first[3])),
+        'low_resolution': area < _LOW_RESOLUTION,
+    }
+    return {**flags, 'empty': present & ~np.any(list(flags.values()), axis=0)}
+
+
+def _has_changed(ratio: Array) -> Flags:
+    return np.asarray((ratio > 2) | (ratio < 0.5), np.bool_)
 
 
 def attribute_figures(overlap: Array, counted: Flags, failures: Sequence[int],

@@ -44,12 +44,12 @@ from lmsco_ros.evaluation.report.score_plots import score_plots
 from lmsco_ros.evaluation.report.style import looks, PUBLISHED_COLOR
 from lmsco_ros.evaluation.report.supervised_plots import expected_overlap_plot, supervised_plots
 from lmsco_ros.evaluation.report.tables import (
-    absence_table, anchor_table, benchmark_table, border_table, Cell, confidence_table,
-    consistency_table, difference_rows, one_pass_table, reliability_table, Row, score_table,
-    start_table, supervised_table, Table)
+    absence_table, anchor_table, attribute_table, benchmark_table, border_table, Cell,
+    confidence_table, consistency_table, difference_rows, one_pass_table, reliability_table, Row,
+    score_table, start_table, supervised_table, Table)
 from lmsco_ros.evaluation.run_file import EvaluationRun
 from lmsco_ros.evaluation.summaries.anchors import anchor_interval, summarize_anchors
-from lmsco_ros.evaluation.summaries.attributes import attribute_names, summarize_attributes
+from lmsco_ros.evaluation.summaries.attributes import attribute_source, summarize_attributes
 from lmsco_ros.evaluation.summaries.benchmarks import summarize_benchmarks
 from lmsco_ros.evaluation.summaries.confidence import confidence_parts, summarize_confidence
 from lmsco_ros.evaluation.summaries.consistency import consistency_parts, summarize_consistency
@@ -140,7 +140,8 @@ def _one_pass(run: EvaluationRun, folder: Path,
         'benchmarks': benchmark_table(summarize_benchmarks(run)),
         'plots': _save_plots(one_pass_plots(summaries), folder),
         'differences': difference_rows(differences(aucs, higher_is_better=True), 3),
-        'attributes': _attributes(run, 'frames'),
+        'attributes': attribute_table(summarize_attributes(run)),
+        'attribute_source': attribute_source(run),
         'challenges': _challenges(run, {item.tracker: item.aucs for item in summaries}),
         'confidence': [_confidence(part, name) for name, part in confidence_parts(run)],
         'reliability': reliability_table(scores),
@@ -184,7 +185,8 @@ def _supervised(run: EvaluationRun, folder: Path) -> dict[str, Any]:
         'table': supervised_table(summaries),
         'plots': _save_plots(supervised_plots(summaries, interval), folder),
         'differences': difference_rows(differences(failures, higher_is_better=False), 2),
-        'attributes': _attributes(run, 'failures'),
+        'attributes': attribute_table(summarize_attributes(run), 'failures'),
+        'attribute_source': attribute_source(run),
         'interval': interval,
     }
 
@@ -195,16 +197,6 @@ def _several_starts(run: EvaluationRun, folder: Path) -> dict[str, Any]:
     plots = {'anchors_eao_curve': expected_overlap_plot(summaries, interval)}
     return {'table': anchor_table(summaries), 'border': border_table(summaries),
             'plots': _save_plots(plots, folder), 'interval': interval}
-
-
-def _attributes(run: EvaluationRun, counted: str) -> Table | None:
-    rows = []
-    for tracker, figures in summarize_attributes(run).items():
-        cells = tuple(Cell(number(item.mean_overlap), str(getattr(item, counted)))
-                      for item in figures.values())
-        rows.append(Row(tracker, cells))
-    titles = tuple(name.replace('_', ' ') for name in attribute_names(run))
-    return Table(titles, tuple(rows)) if rows else None
 
 
 def _sequence_table(runs: Mapping[str, EvaluationRun],

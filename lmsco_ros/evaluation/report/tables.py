@@ -16,13 +16,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 import math
-from typing import Generic, TypeVar
+from typing import Generic, Literal, TypeVar
 
 from lmsco_ros.evaluation.protocols.bootstrap import Estimate
 from lmsco_ros.evaluation.protocols.calibration import BINS
+from lmsco_ros.evaluation.protocols.per_attribute import AttributeFigures
 from lmsco_ros.evaluation.report.formatting import interval, number, signed
 from lmsco_ros.evaluation.summaries.anchors import AnchorSummary, StartFigures
 from lmsco_ros.evaluation.summaries.benchmarks import BenchmarkSummary
@@ -105,6 +106,26 @@ class _Column(Generic[Summary]):
     decimals: int = 3
     direction: int = 1
     ranged: bool = True
+
+
+def attribute_table(figures: Mapping[str, Mapping[str, AttributeFigures]],
+                    counted: Literal['frames', 'failures'] = 'frames') -> Table:
+    """
+    Return the mean overlap on the frames of each attribute, and what is counted there.
+
+    Parameters
+    ----------
+    figures : mapping of str to mapping
+        For each tracker, those of each attribute.
+    counted : {'frames', 'failures'}
+        Which number stands with it.
+
+    """
+    rows = tuple(Row(tracker, tuple(
+        Cell(number(item.mean_overlap), str(getattr(item, counted)))
+        for item in known.values())) for tracker, known in figures.items())
+    titles = tuple(name.replace('_', ' ') for name in next(iter(figures.values())))
+    return Table(titles, rows)
 
 
 def one_pass_table(summaries: Sequence[OnePassSummary]) -> Table:
