@@ -82,7 +82,7 @@ class Track:
         condition = self._gain.examine(frame)
         view = FrameView(frame.image, condition.intensity)
         self._new_detector = partial(Detector, config, backend, networks)
-        first = self._learn(view, box)
+        first = self._start_detector(view, box)
         meter = ExtentMeter.marked(networks.extent, view, box) if networks.extent else None
         self._monitor = PresenceMonitor(config.presence)
         self._monitor.note_noise(condition.noise)
@@ -193,13 +193,13 @@ class Track:
 
     def _begin_anew(self, view: FrameView) -> None:
         """Learn the target as it is now, as if it was marked in this frame."""
-        first = self._learn(view, self.result.box)
+        first = self._start_detector(view, self.result.box)
         self._training_due = False
         self._observer.begin(self._detector, first)
         self._monitor.expect_anew()
         self._detector.watch(view, self.course.expected(view.size))
 
-    def _learn(self, view: FrameView, box: BoundingBox) -> Detection:
+    def _start_detector(self, view: FrameView, box: BoundingBox) -> Detection:
         """Return what a new detector sees of what it has learned."""
         self._detector = self._new_detector(view, box)
         self._learned = visible_part(box, view.size)

@@ -291,14 +291,13 @@ def test_drag_starts_a_track_that_stays_on_the_target(page, site):
     page.start(site)
     overlaps = {}
     deadline = time.monotonic() + PATIENCE
-    # For five seconds of the camera.
-    while not overlaps or max(overlaps) - min(overlaps) < 5e9:
+    while len(overlaps) < 60:
         assert time.monotonic() < deadline
         state = page.state
         assert state['state'] in ('tracking', 'uncertain')
         overlaps[int(state['stamp'])] = overlap(state['targets'][0]['box'],
                                                 site.box(state['stamp']))
-    assert len(overlaps) > 30 and np.mean(list(overlaps.values())) > 0.5
+    assert np.mean(list(overlaps.values())) > 0.5
     assert min(overlaps.values()) > 0.2
     # What is seen for a moment may be uncertain.
     page.until(lambda: 'tracking' in page.text('state') and '°C' in page.text('heat'))

@@ -160,7 +160,7 @@ class Observer:
         if self.is_distractor(outlook, detection):
             detection = self._detector.near(detection, outlook.expected.center)
         box = outlook.expected.moved_to(detection.center)
-        # Nothing else would say where it ends.
+        # Without a measurement, nothing would say where it ends.
         found = box if self._meter is None else outlook.come_in(box)
         return (yield from self._ask(outlook, detection, found))
 
