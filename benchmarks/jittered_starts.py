@@ -235,7 +235,7 @@ def report(outcomes: Mapping[str, Sequence[Outcome]], sequences: Sequence[Tracki
 
 
 def sequence_options(description: str) -> argparse.ArgumentParser:
-    """Return a parser that knows which sequences are meant, and how many starts."""
+    """Return a parser that knows which sequences are meant."""
     parser = argparse.ArgumentParser(description=description)
     parser.add_argument('datasets', type=Path, nargs='+', metavar='DATASET')
     parser.add_argument('--split', type=Path)
@@ -243,7 +243,6 @@ def sequence_options(description: str) -> argparse.ArgumentParser:
     parser.add_argument('--only', nargs='+', metavar='PATTERN')
     parser.add_argument('--challenge', choices=CHALLENGES)
     parser.add_argument('--frames', type=positive, default=60)
-    parser.add_argument('--starts', type=positive, default=3)
     return parser
 
 
@@ -251,6 +250,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     """Print the tables, or write them into a page."""
     parser = sequence_options(__doc__.strip().splitlines()[0])
     parser.add_argument('--trackers', type=Path, required=True)
+    parser.add_argument('--starts', type=positive, default=3)
     parser.add_argument('--each', action='store_true', help='a table for each sequence')
     parser.add_argument('--page', type=Path)
     parser.add_argument('--name', default='comparison')

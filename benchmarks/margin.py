@@ -37,7 +37,7 @@ import numpy.typing as npt
 
 from benchmarks.jittered_starts import (
     chosen_sequences, DecodedFrames, Outcome, report, run, sequence_options)
-from benchmarks.measurement import markdown_table
+from benchmarks.measurement import markdown_table, positive
 from lmsco_ros.core import BoundingBox, TrackerConfig, TrackResult
 from lmsco_ros.core.backend import limit_threads
 from lmsco_ros.core.learning import structured_operator
@@ -202,6 +202,7 @@ def margin_table(margins: Mapping[str, Sequence[Sequence[float]]]) -> str:
 def main(arguments: Sequence[str] | None = None) -> None:
     """Print both tables."""
     parser = sequence_options(__doc__.strip().splitlines()[0])
+    parser.add_argument('--starts', type=positive, default=3)
     parser.add_argument('--each', action='store_true', help='a table for each sequence')
     options = parser.parse_args(arguments)
     limit_threads(1)

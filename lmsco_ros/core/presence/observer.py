@@ -26,7 +26,7 @@ from lmsco_ros.core.detection.scale import found_factor
 from lmsco_ros.core.extent.measurement import ExtentMeter, Measurement
 from lmsco_ros.core.imaging.regions import held_at_border
 from lmsco_ros.core.imaging.view import FrameView
-from lmsco_ros.core.networks.together import Asking, at_once
+from lmsco_ros.core.networks.together import Asking, at_once, side_by_side
 from lmsco_ros.core.presence.distractors import Distractors
 from lmsco_ros.core.presence.evidence import Assessment, Evidence
 from lmsco_ros.core.presence.monitor import PresenceMonitor
@@ -157,12 +157,23 @@ class Observer:
         if outlook.neighbors is not None and outlook.is_neighbor(detection):
             detection = self._detector.near(
                 detection, outlook.neighbors.own, outlook.neighbors.owned)
+        if self._monitor.hurried and self.is_distractor(outlook, detection):
+            detection = self._detector.near(detection, outlook.expected.center)
+        sighting = yield from self._ask(outlook, detection, self._found(outlook, detection))
+        if self._monitor.hurried or not self._monitor.believable(sighting.assessment):
+            return sighting
+        # To look back for a distractor costs as much as a frame: a lost target waits for what
+        # would be believed.
         if self.is_distractor(outlook, detection):
             detection = self._detector.near(detection, outlook.expected.center)
+            sighting = yield from self._ask(outlook, detection, self._found(outlook, detection))
+        return sighting
+
+    def _found(self, outlook: Outlook, detection: Detection) -> BoundingBox:
+        """Return the target, as large as before, where it was detected."""
         box = outlook.expected.moved_to(detection.center)
         # Without a measurement, nothing would say where it ends.
-        found = box if self._meter is None else outlook.come_in(box)
-        return (yield from self._ask(outlook, detection, found))
+        return box if self._meter is None else outlook.come_in(box)
 
     def detect(self, outlook: Outlook, box: BoundingBox) -> Detection:
         """Return what the filter sees around a box in its size."""
@@ -172,9 +183,12 @@ class Observer:
         """Return a detection around a box, measured, with all that speaks for it."""
         return at_once(self._ask(outlook, detection, box.moved_to(detection.center)))
 
-    def measure(self, outlook: Outlook, box: BoundingBox) -> float | None:
-        """Return the log-odds that the target is in a box; None where nothing measures."""
-        return None if self._meter is None else self._meter(outlook.view, box).presence
+    def presence(self, outlook: Outlook, boxes: Sequence[BoundingBox]) -> list[float | None]:
+        """Return the log-odds that the target is in each box; None where nothing measures."""
+        if self._meter is None:
+            return [None] * len(boxes)
+        asked = {place: self._meter.ask(outlook.view, box) for place, box in enumerate(boxes)}
+        return [measured.presence for measured in side_by_side(asked).values()]
 
     def _ask(self, outlook: Outlook, detection: Detection,
              found: BoundingBox) -> Asking[Sighting]:

@@ -73,17 +73,22 @@ class Meter:
 
     def __init__(self):
         self.presence, self.calls, self.measurements = 3.0, [], []
+        self.odds, self.passes = [], []
 
     def ask(self, view, box):
         self.calls.append((view, box))
-        return (yield Ask('meter', lambda turns: [self.measured() for _ in turns], box))
+        return (yield Ask('meter', self.answers, box))
 
     def __call__(self, view, box):
         return at_once(self.ask(view, box))
 
+    def answers(self, turns):
+        self.passes.append(len(turns))
+        return [self.measured() for _ in turns]
+
     def measured(self):
-        edges = np.array([[100, 118], [70, 92]])
-        self.measurements.append(Measurement(edges, np.ones((2, 2)), self.presence))
+        edges, odds = np.array([[100, 118], [70, 92]]), self.odds or [self.presence]
+        self.measurements.append(Measurement(edges, np.ones((2, 2)), odds.pop(0)))
         return self.measurements[-1]
 
 
@@ -159,13 +164,16 @@ def test_first_frame_is_measured_as_all_others(observer, meter):
 def test_first_frame_tells_what_there_is_without_a_network(detector, monitor):
     observer = Observer(detector, None, monitor, FIRST)
     assert observer.introduce(view(), LAST) == Evidence(FIRST.sharpness)
-    assert observer.measure(Outlook(view(), LAST, EXPECTED, LAST), LAST) is None
+    outlook = Outlook(view(), LAST, EXPECTED, LAST)
+    assert observer.presence(outlook, [LAST, EXPECTED]) == [None, None]
 
 
-def test_place_can_be_measured_without_the_filter(observer, detector, meter, outlook):
-    meter.presence = 0.5
-    assert observer.measure(outlook, LAST) == 0.5
-    assert meter.calls == [(outlook.view, LAST)] and detector.calls == []
+def test_places_are_measured_in_one_pass_without_the_filter(observer, detector, meter, outlook):
+    meter.odds = [0.5, -2.0]
+    assert observer.presence(outlook, [LAST, EXPECTED]) == [0.5, -2.0]
+    assert meter.calls == [(outlook.view, LAST), (outlook.view, EXPECTED)]
+    assert meter.passes == [2] and detector.calls == []
+    assert observer.presence(outlook, []) == []
 
 
 def test_sighting_is_found_where_it_was_detected(observer, detector, outlook):
@@ -274,6 +282,33 @@ def test_target_is_looked_for_beside_a_distractor(with_twin, detector, outlook):
     sighting = look(with_twin, outlook)
     assert detector.neared == [(distractor, EXPECTED.center)]
     assert sighting.detection.center == EXPECTED.center
+
+
+@pytest.fixture
+def lost(monitor):
+    """Let the target have been lost for a while."""
+    for _ in range(30):
+        monitor.judge(monitor.assess(Evidence(0.0)))
+    assert not monitor.hurried
+
+
+def test_lost_target_waits_for_what_would_be_believed_before_it_looks_back(
+        observer, detector, meter, outlook, lost):
+    observer.keep(outlook.view, LAST)
+    meter.presence, detector.next = -8.0, [seen(TWIN, sharpness=1.0)]
+    sighting = look(observer, outlook)
+    assert sighting.detection.center == TWIN
+    assert detector.calls == [(outlook.view, EXPECTED, (1.0,))] and detector.neared == []
+
+
+def test_lost_target_is_not_found_in_a_distractor(
+        observer, detector, outlook, lost, monkeypatch, monitor):
+    monkeypatch.setattr(monitor, 'believable', lambda seen: True)
+    observer.keep(outlook.view, LAST)
+    detector.next = [distractor := seen(TWIN)]
+    sighting = look(observer, outlook)
+    assert detector.neared[-1] == (distractor, EXPECTED.center)
+    assert (sighting.detection.center, sighting.found.center) == (EXPECTED.center,) * 2
 
 
 def test_known_distractors_are_watched_where_they_were(with_twin, detector, outlook):
