@@ -111,14 +111,21 @@ class Redetection:
             if sharpest is None or not self._monitor.hints(sharpest.sharpness):
                 return []
             return [self._look_again(outlook, sharpest)]
-        places = self._salient(outlook, _MANY) if self._schedule.candidates else []
-        if turn is not Turn.ANYWHERE:
-            center = (outlook.last if turn is Turn.NEAR else outlook.predicted).center
-            reach = _NEAR * outlook.expected.area**0.5
-            places = [box for box in places if math.dist(box.center, center) < reach]
+        places = self._meant(outlook, turn) if self._schedule.candidates else []
         chosen = self._schedule.measured(outlook.misses, len(places))
         best = self._most_present(outlook, places[chosen.start:chosen.stop])
         return [] if best is None else [self._look_at(outlook, best)]
+
+    def _meant(self, outlook: Outlook, turn: Turn) -> list[BoundingBox]:
+        """Return the salient places that a turn is about, the most salient first."""
+        places, most = self._salient(outlook, _MANY), self._schedule.candidates
+        if turn is Turn.SALIENT:
+            return places[:most]
+        if turn is Turn.ANYWHERE:
+            return places[most:]
+        center = (outlook.last if turn is Turn.NEAR else outlook.predicted).center
+        reach = _NEAR * outlook.expected.area**0.5
+        return [box for box in places if math.dist(box.center, center) < reach]
 
     def _most_present(self, outlook: Outlook, places: list[BoundingBox]) -> BoundingBox | None:
         """Return the place that the network takes for the target, or the first without one."""

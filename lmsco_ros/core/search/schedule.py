@@ -34,12 +34,13 @@ class Turn(Enum):
 
     NEAR = 'at what is salient around the last place'
     AHEAD = 'at what is salient around the place to which its motion has led'
-    ANYWHERE = 'at what is salient in the whole image'
+    SALIENT = 'at what is most salient in the image'
+    ANYWHERE = 'at what is less salient there'
     TILES = 'in a slice of the image'
 
 
-_CYCLE = (Turn.NEAR, Turn.ANYWHERE, Turn.TILES, Turn.ANYWHERE,
-          Turn.AHEAD, Turn.ANYWHERE, Turn.TILES, Turn.ANYWHERE)
+_CYCLE = (Turn.NEAR, Turn.SALIENT, Turn.TILES, Turn.ANYWHERE,
+          Turn.AHEAD, Turn.SALIENT, Turn.TILES, Turn.ANYWHERE)
 
 
 class Schedule:

@@ -153,7 +153,8 @@ FURTHER = [BoundingBox.from_center(place, (14, 11)) for place in ((290, 40), (25
 
 
 @pytest.mark.parametrize('misses, measured', [
-    (16, NEARBY[:2]), (8, NEARBY[2:]), (12, FURTHER), (1, SALIENT[:2]), (3, SALIENT[2:4])])
+    (16, NEARBY[:2]), (8, NEARBY[2:]), (12, FURTHER), (1, SALIENT[:2]), (5, SALIENT[2:4]),
+    (3, SALIENT[6:] + NEARBY[:1])])
 def test_lost_target_is_measured_at_salient_places_nearby_ahead_and_anywhere(
         redetect, observer, salience, outlook, misses, measured):
     salience.candidates.return_value = SALIENT + NEARBY + FURTHER
@@ -167,7 +168,7 @@ def test_filter_looks_where_the_network_is_surest_to_see_the_target(
     redetection = Redetection(SearchConfig(candidates=3), observer, monitor, outlook.view, LAST)
     observer.odds = {SALIENT[0].center: 0.5, SALIENT[1].center: 2.0}
     observer.put(SALIENT[1].center, score=0.9)
-    after_some = replace(outlook, misses=19)
+    after_some = replace(outlook, misses=1)
     assert redetection(after_some, here, after_shutter=False).found == SALIENT[1]
     assert observer.measured == SALIENT[:3]
     assert observer.detected == observer.looked == [SALIENT[1]]
@@ -175,7 +176,7 @@ def test_filter_looks_where_the_network_is_surest_to_see_the_target(
 
 def test_filter_looks_at_the_most_salient_place_where_nothing_measures(redetect, observer):
     observer.odds = dict.fromkeys((box.center for box in SALIENT), None)
-    redetect(9)
+    redetect(1)
     assert observer.detected == [SALIENT[0]]
 
 
