@@ -16,6 +16,7 @@
 
 from dataclasses import replace
 from html.parser import HTMLParser
+import re
 
 import numpy as np
 import pytest
@@ -143,6 +144,19 @@ def test_page_of_one_protocol_alone(parse, runs, protocol):
     assert page.images == 4 + (protocol == 'ope') + 2 + 2
     anchors = [item for item in page.references if item.startswith('#')]
     assert ('#one-pass' in anchors) == (protocol == 'ope')
+
+
+@pytest.mark.parametrize('protocol, note, counted', [
+    ('ope', 'below it the number of frames. They are annotated.', ['24', '24']),
+    ('vot', 'below it the failures. They are annotated.', ['0', '2'])])
+def test_attributes_are_told_with_what_is_counted(
+        tmp_path, sequences, runs, protocol, note, counted):
+    """Each sequence fails once, in the first frame without camera motion."""
+    path = write_report(tmp_path, {protocol: runs[protocol]},
+                        {item.full_name: item for item in sequences})
+    table = path.read_text(encoding='utf-8').split(note)[1].split('</table>')[0]
+    row = next(row for row in table.split('</tr>') if 'lazy' in row)
+    assert re.findall(r'class="range">(.*?)<', row) == counted
 
 
 def test_only_the_tracker_that_fails_is_shown_failing(runs):

@@ -192,3 +192,11 @@ def test_the_version_that_is_released_is_one_that_is_mended():
 def test_what_is_deprecated_and_how_long_is_told():
     promise = (REPOSITORY / 'RELEASING.md').read_text().split('\n## What a number promises\n')[1]
     assert '`DeprecationWarning`' in promise and '(docs/public_api.md)' in promise
+
+
+def test_page_of_the_paper_quotes_figures_of_the_results():
+    results = (DOCS / 'results.md').read_text().split('## All sequences')[1]
+    quoted = re.findall(r'\[in all\]\(results\.md\): ([^|]*)', (DOCS / 'paper.md').read_text())
+    figures = {figure for cell in quoted for figure in re.findall(r'\.\d{2,3}\b', cell)}
+    assert len(quoted) == 2 and figures
+    assert figures <= set(re.findall(r'\.\d{2,3}\b', results))

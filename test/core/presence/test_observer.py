@@ -284,6 +284,14 @@ def test_target_is_looked_for_beside_a_distractor(with_twin, detector, outlook):
     assert sighting.detection.center == EXPECTED.center
 
 
+def test_what_was_just_seen_is_looked_back_for_once(observer, detector, meter, outlook):
+    observer.keep(outlook.view, LAST)
+    detector.next, meter.odds = [seen(TWIN)], [-8.0, 3.0]
+    assert look(observer, outlook).detection.center == TWIN
+    # In this frame, and in the kept one.
+    assert len(detector.calls) == 2
+
+
 @pytest.fixture
 def lost(monitor):
     """Let the target have been lost for a while."""

@@ -154,6 +154,7 @@ FURTHER = [BoundingBox.from_center(place, (14, 11)) for place in ((290, 40), (25
 
 @pytest.mark.parametrize('misses, measured', [
     (16, NEARBY[:2]), (8, NEARBY[2:]), (12, FURTHER), (1, SALIENT[:2]), (5, SALIENT[2:4]),
+    (13, SALIENT[:2]),
     (3, SALIENT[6:] + NEARBY[:1])])
 def test_lost_target_is_measured_at_salient_places_nearby_ahead_and_anywhere(
         redetect, observer, salience, outlook, misses, measured):
