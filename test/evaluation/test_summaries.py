@@ -141,11 +141,11 @@ def test_attributes_by_boxes():
         [0, 0, 56, 28],    # width over height 2, area .98
         [0, 0, 60, 29],    # above 2
         [0, 0, 20, 39],    # .4875 of the area, 780 pixels, .51 wide for its height
-        [10, -20, 80, 80]])  # 40 pixels away from one of 28; four times the area
+        [10, -20, 80, 80]])  # 40 pixels from one of 28; four times the area
     flags = {name: np.flatnonzero(values).tolist()
              for name, values in box_attributes(boxes).items()}
-    assert flags == {'fast_motion': [2, 8], 'scale_variation': [3, 7, 8], 'aspect_ratio_change': [6],
-                     'low_resolution': [7], 'empty': [0, 1, 5]}
+    assert flags == {'fast_motion': [2, 8], 'scale_variation': [3, 7, 8],
+                     'aspect_ratio_change': [6], 'low_resolution': [7], 'empty': [0, 1, 5]}
 
 
 def test_confidence_pools_sequences():
