@@ -89,9 +89,9 @@ class Schedule:
         """
         Return which of so many salient places are measured now; each time, others are.
 
-        They are three quarters of those that a frame in a hurry looks at.
+        They are half of those that a frame in a hurry looks at.
         """
-        count = -(-3 * self._config.candidates // 4)
+        count = -(-self._config.candidates // 2)
         if not count or not places:
             return range(0)
         turn = misses * _CYCLE.count(self.turn(misses)) // len(_CYCLE)
