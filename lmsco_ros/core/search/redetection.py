@@ -100,32 +100,27 @@ class Redetection:
         chosen = self._schedule.salient(outlook.misses)
         places = self._salient(outlook, self._schedule.candidates) if chosen else []
         seen = [self._look_at(outlook, box) for box in places[chosen.start:chosen.stop]]
-        sharpest = self._tiles(outlook, here, slices * self._schedule.slice)
+        sharpest = self._tiles(outlook, here, slices)
         return seen + ([] if sharpest is None else [self._look_again(outlook, sharpest)])
 
     def _sparing(self, outlook: Outlook, here: Sighting) -> list[Sighting]:
         """Return what is where the turn is, if anything is: it costs little more than a frame."""
         turn = self._schedule.turn(outlook.misses)
         if turn is Turn.TILES:
-            sharpest = self._tiles(outlook, here, -(-self._schedule.slice // 2))
+            sharpest = self._tiles(outlook, here, 1)
             if sharpest is None or not self._monitor.hints(sharpest.sharpness):
                 return []
             return [self._look_again(outlook, sharpest)]
-        places = self._meant(outlook, turn) if self._schedule.candidates else []
-        chosen = self._schedule.measured(outlook.misses, len(places))
-        best = self._most_present(outlook, places[chosen.start:chosen.stop])
-        return [] if best is None else [self._look_at(outlook, best)]
-
-    def _meant(self, outlook: Outlook, turn: Turn) -> list[BoundingBox]:
-        """Return the salient places that a turn is about, the most salient first."""
-        places, most = self._salient(outlook, _MANY), self._schedule.candidates
-        if turn is Turn.SALIENT:
-            return places[:most]
+        chosen = self._schedule.measured(outlook.misses)
+        places = self._salient(outlook, _MANY) if chosen else []
         if turn is Turn.ANYWHERE:
-            return places[most:]
-        center = (outlook.last if turn is Turn.NEAR else outlook.predicted).center
-        reach = _NEAR * outlook.expected.area**0.5
-        return [box for box in places if math.dist(box.center, center) < reach]
+            places = places[chosen.start:chosen.stop]
+        else:
+            center = (outlook.last if turn is Turn.NEAR else outlook.predicted).center
+            reach = _NEAR * outlook.expected.area**0.5
+            places = [box for box in places if math.dist(box.center, center) < reach]
+        best = self._most_present(outlook, places[:len(chosen)])
+        return [] if best is None else [self._look_at(outlook, best)]
 
     def _most_present(self, outlook: Outlook, places: list[BoundingBox]) -> BoundingBox | None:
         """Return the place that the network takes for the target, or the first without one."""
@@ -139,10 +134,10 @@ class Redetection:
         scales = _CUT_SCALES if self._monitor.after_cut else (1.0,)
         return self._salience.candidates(outlook.view, outlook.expected, count, scales)
 
-    def _tiles(self, outlook: Outlook, here: Sighting, count: int) -> Detection | None:
+    def _tiles(self, outlook: Outlook, here: Sighting, slices: int) -> Detection | None:
         """Return the sharpest detection in the regions whose turn it is."""
         places = self._schedule.tiles(outlook.view.size, here.detection.region.width,
-                                      outlook.expected.center, count)
+                                      outlook.expected.center, slices)
         found = [self._observer.detect(outlook, outlook.expected.moved_to(place))
                  for place in places]
         return max(found, key=lambda detection: detection.sharpness, default=None)

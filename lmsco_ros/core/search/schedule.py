@@ -34,13 +34,11 @@ class Turn(Enum):
 
     NEAR = 'at what is salient around the last place'
     AHEAD = 'at what is salient around the place to which its motion has led'
-    SALIENT = 'at what is most salient in the image'
-    ANYWHERE = 'at what is less salient there'
+    ANYWHERE = 'at what is salient in the whole image'
     TILES = 'in a slice of the image'
 
 
-_CYCLE = (Turn.NEAR, Turn.SALIENT, Turn.TILES, Turn.ANYWHERE,
-          Turn.AHEAD, Turn.SALIENT, Turn.TILES, Turn.ANYWHERE)
+_SALIENT_TURNS = (Turn.NEAR, Turn.AHEAD, Turn.ANYWHERE)
 
 
 class Schedule:
@@ -64,13 +62,8 @@ class Schedule:
 
     @property
     def candidates(self) -> int:
-        """How many salient places there are turns for while it hurries."""
+        """How many salient places there are turns for."""
         return _TURNS * self._config.candidates
-
-    @property
-    def slice(self) -> int:
-        """How many regions are a slice of the image."""
-        return self._config.tiles
 
     def restart(self) -> None:
         """Begin the search anew, from where the target is expected then."""
@@ -83,23 +76,19 @@ class Schedule:
 
     def turn(self, misses: int) -> Turn:
         """Return where a lost target is looked for, so many frames after it was seen."""
-        return _CYCLE[misses % len(_CYCLE)]
+        if misses % 2:
+            return Turn.TILES
+        return _SALIENT_TURNS[misses // 2 % len(_SALIENT_TURNS)]
 
-    def measured(self, misses: int, places: int) -> range:
-        """
-        Return which of so many salient places are measured now; each time, others are.
-
-        They are half of those that a frame in a hurry looks at.
-        """
+    def measured(self, misses: int) -> range:
+        """Return which of the salient places are measured when these have their turn."""
         count = -(-self._config.candidates // 2)
-        if not count or not places:
-            return range(0)
-        turn = misses * _CYCLE.count(self.turn(misses)) // len(_CYCLE)
-        first = turn % -(-places // count) * count
-        return range(first, min(first + count, places))
+        turns = -(-self.candidates // count) if count else 1
+        first = misses // (2 * len(_SALIENT_TURNS)) % turns * count
+        return range(first, first + count)
 
     def tiles(self, image_size: tuple[int, int], side: float, around: _Point,
-              count: int) -> list[_Point]:
+              slices: int) -> list[_Point]:
         """
         Return the centers of the regions to be searched in this frame.
 
@@ -111,12 +100,12 @@ class Schedule:
             Side of a region.
         around : tuple of float
             Where the search begins, if it does so in this frame.
-        count : int
-            How many regions at once.
+        slices : int
+            How many slices at once.
 
         """
         if not self._order:
             self._order, self._next = search_tiles(image_size, side, around), 0
-        count = min(count, len(self._order))
+        count = min(slices * self._config.tiles, len(self._order))
         first, self._next = self._next, self._next + count
         return [self._order[(first + i) % len(self._order)] for i in range(count)]

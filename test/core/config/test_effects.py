@@ -174,7 +174,7 @@ def searched(config, scene):
     schedule, told = Schedule(config.search), []
     for misses in range(4):
         salient = schedule.salient(misses)
-        told += [salient.start, salient.stop, schedule.slice]
+        told += [salient.start, salient.stop, len(schedule.tiles((640, 512), 80, START, 1))]
     return told
 
 
