@@ -20,7 +20,7 @@ from lmsco_ros.core.config import PresenceConfig
 from lmsco_ros.core.presence.evidence import (
     Assessment, Evidence, JUMP, NOTHING_STANDS_OUT, Verdict)
 from lmsco_ros.core.presence.expectation import Expectation
-from lmsco_ros.core.presence.trust import belief, trust
+from lmsco_ros.core.presence.trust import belief, log_odds, trust
 from lmsco_ros.core.types import TrackState
 
 __all__ = ['PresenceMonitor']
@@ -48,6 +48,9 @@ _STANDING_OUT = 0.6
 _DOUBTED = 0.5
 # Score of a frame that shows nothing, where nothing stood out at the start.
 _NOTHING = 0.2
+# Belief that speaks neither for a target nor against it, in the long run; and log-odds against it,
+# in as many frames as lead to LOST, that do so even if it is believed; no frame has more.
+_LASTING, _WEARING = 0.4, 2.0
 
 # Part of the sharpness that convinces, of a target that is not in the middle of its region.
 _HINT = 0.5
@@ -72,6 +75,7 @@ class PresenceMonitor:
         self._expectation = Expectation(config.reference_frames)
         self._state = TrackState.TRACKING
         self._misses = 0
+        self._against = 0.0
         self._cut = 0
         self._promised = False
         self._probation = 0
@@ -170,8 +174,10 @@ class PresenceMonitor:
         if found and not agreed and self._needs_another(seen):
             found, promising = False, True
         given_up = not found and self._probation > 0
+        worn_out = self._worn_out(seen)
         elsewhere = found and (agreed or seen.evidence.jump > _ELSEWHERE)
         self._misses = 0 if found else self._misses + 1
+        self._against = self._against_with(seen)
         self._cut = 0 if found else max(0, self._cut - 1)
         self._probation = (_PROBATION if elsewhere
                            else max(0, self._probation - 1) if found else 0)
@@ -182,7 +188,8 @@ class PresenceMonitor:
                            else TrackState.UNCERTAIN)
             self._doubtful &= self._state is not TrackState.TRACKING
         elif self._state is not TrackState.LOST:
-            lost = given_up or self.after_cut or self._misses >= self.config.lost_frames
+            lost = (given_up or self.after_cut or worn_out
+                    or self._misses >= self.config.lost_frames)
             self._state = TrackState.LOST if lost else TrackState.UNCERTAIN
         always = self.config.learn == 'always'
         score = _DOUBTED * seen.score if self._doubtful else seen.score
@@ -199,7 +206,25 @@ class PresenceMonitor:
             return not likely and not self.convincing(seen)
         doubted = seen.evidence.jump > JUMP or self._probation > 0
         return (seen.belief < (_LIKELY if doubted else self.config.lost)
-                or self._doubtful and seen.score < _NOTHING)
+                or self._worn_out(seen) or self._doubtful and seen.score < _NOTHING)
+
+    def _worn_out(self, seen: Assessment) -> bool:
+        """Return whether too much has spoken against the target, frame by frame, for too long."""
+        return self._against_with(seen) >= _WEARING * self.config.lost_frames
+
+    def _against_with(self, seen: Assessment) -> float:
+        """
+        Return what speaks against the target after a frame: a cumulative sum of log-odds.
+
+        As in the test of Page (1954), which is never below 0; of belief and network, the one that
+        doubts more. What is lost has nothing left to be worn out.
+        """
+        if self._state is TrackState.LOST:
+            return 0.0
+        against = log_odds(_LASTING) - log_odds(seen.belief)
+        if seen.evidence.presence is not None:
+            against = max(against, -seen.evidence.presence)
+        return max(0.0, self._against + min(against, _WEARING))
 
     def _needs_another(self, seen: Assessment) -> bool:
         """

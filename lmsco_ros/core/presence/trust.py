@@ -25,13 +25,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 import math
 
-__all__ = ['belief', 'trust', 'TrustModel', 'MEASURED', 'UNMEASURED']
+__all__ = ['belief', 'log_odds', 'trust', 'TrustModel', 'MEASURED', 'UNMEASURED']
 
 # The first is taken for what is not a number: it speaks against the target.
 _QUALITY_LIMITS = 0.02, 5.0
 _LIKENESS_LIMITS = -0.5, 1.5
 _PRESENCE_LIMITS = -8.0, 8.0
 _VAGUENESS_LIMITS = 0.5, 0.03
+_PROBABILITY_LIMITS = 1e-4, 1 - 1e-4
 
 
 @dataclass(frozen=True)
@@ -113,6 +114,12 @@ def belief(quality: float, likeness: float, presence: float | None = None,
     unmeasured = presence is None or vagueness is None
     return _probability(BELIEF_UNMEASURED if unmeasured else BELIEF_MEASURED,
                         regressors(quality, likeness, presence, vagueness))
+
+
+def log_odds(probability: float) -> float:
+    """Return the logarithm of a probability over that of the opposite; bounded."""
+    likely = _clip(probability, _PROBABILITY_LIMITS)
+    return math.log(likely / (1 - likely))
 
 
 def _probability(model: TrustModel, values: tuple[float, ...]) -> float:

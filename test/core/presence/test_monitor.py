@@ -127,6 +127,54 @@ def test_misses_must_be_in_a_row(monitor):
         assert judge(monitor, CLEAR).state is TrackState.TRACKING
 
 
+def test_target_is_lost_after_lasting_doubt(monitor):
+    # Log-odds of .69 against it, from a belief of .4 on, in each frame; 2 in each of three frames
+    # are enough, so in nine of these.
+    doubt = at_score(monitor, 0.25)
+    verdicts = [judge(monitor, doubt) for _ in range(9)]
+    assert [verdict.state for verdict in verdicts] == (
+        [TrackState.UNCERTAIN] * 8 + [TrackState.LOST])
+    assert [verdict.believed for verdict in verdicts] == [True] * 8 + [False]
+
+
+def test_target_is_lost_where_the_network_denies_it_for_long(monkeypatch, monitor):
+    monkeypatch.setattr(trust_module, 'BELIEF_MEASURED', TrustModel(0.0, 0.0, 0.0, 0.0, 3.0))
+    states = [judge(monitor, evidence(10.0, presence=-0.7)).state for _ in range(9)]
+    assert TrackState.LOST not in states[:8] and states[8] is TrackState.LOST
+
+
+def test_no_frame_speaks_against_the_target_like_several(monitor):
+    believed = monitor.assess(CLEAR)
+    denied = replace(believed, evidence=replace(believed.evidence, presence=-100.0))
+    assert [monitor.judge(denied).state is TrackState.LOST for _ in range(3)] == [
+        False, False, True]
+
+
+@pytest.mark.parametrize('doubt', [
+    {'presence': 0.0, 'belief': 0.9}, {'presence': 4.0, 'belief': 0.4},
+    {'presence': None, 'belief': 0.4}])
+def test_doubt_that_may_last_does_not_lose_the_target(monitor, doubt):
+    seen = monitor.assess(CLEAR)
+    seen = replace(seen, evidence=replace(seen.evidence, presence=doubt['presence']),
+                   belief=doubt['belief'])
+    assert TrackState.LOST not in {monitor.judge(seen).state for _ in range(100)}
+
+
+def test_frame_that_speaks_for_the_target_outweighs_many(monitor):
+    doubt = at_score(monitor, 0.25)
+    for _ in range(5):
+        for _ in range(8):
+            assert judge(monitor, doubt).state is TrackState.UNCERTAIN
+        assert judge(monitor, evidence(10.0, presence=6.0)).state is TrackState.TRACKING
+
+
+def test_doubt_of_a_search_does_not_count_after_it(monitor):
+    for _ in range(20):
+        judge(monitor, GONE)
+    states = [judge(monitor, CLEAR).state for _ in range(4)]
+    assert TrackState.LOST not in states[1:]
+
+
 @pytest.mark.parametrize('lack', [
     evidence(10.0, 0.2, 4.0), evidence(3.5, 1.0, 4.0), evidence(10.0, 1.0, -0.1)],
     ids=['first filter', 'filter', 'network'])
@@ -603,7 +651,7 @@ def test_frame_is_believed_by_what_speaks_for_the_target_and_not_for_the_box(mon
 
 def test_doubted_start_is_lost_by_its_score_until_it_stands_out(monkeypatch):
     monkeypatch.setattr(trust_module, 'BELIEF_MEASURED', TrustModel(0.0, 0.0, 0.0, 0.0, 3.0))
-    nothing = evidence(10.0, 0.3, -4.0, vagueness=0.5)
+    nothing = evidence(10.0, 0.3, -1.5, vagueness=0.5)
     for first, states in ((nothing, [TrackState.UNCERTAIN] * 2 + [TrackState.LOST]),
                           (CLEAR, [TrackState.UNCERTAIN] * 3)):
         monitor = PresenceMonitor(CONFIG)
