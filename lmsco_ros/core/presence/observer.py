@@ -26,7 +26,7 @@ from lmsco_ros.core.detection.scale import found_factor
 from lmsco_ros.core.extent.measurement import ExtentMeter, Measurement
 from lmsco_ros.core.imaging.regions import held_at_border
 from lmsco_ros.core.imaging.view import FrameView
-from lmsco_ros.core.networks.together import Asking, at_once, side_by_side
+from lmsco_ros.core.networks.together import Asking, side_by_side
 from lmsco_ros.core.presence.distractors import Distractors
 from lmsco_ros.core.presence.evidence import Assessment, Evidence
 from lmsco_ros.core.presence.monitor import PresenceMonitor
@@ -175,13 +175,17 @@ class Observer:
         # Without a measurement, nothing would say where it ends.
         return box if self._meter is None else outlook.come_in(box)
 
-    def detect(self, outlook: Outlook, box: BoundingBox) -> Detection:
-        """Return what the filter sees around a box in its size."""
-        return self._detector(outlook.view, box)
+    def detect(self, outlook: Outlook, boxes: Sequence[BoundingBox]) -> list[Detection]:
+        """Return what the filter sees around boxes, each in its size; the networks see them all."""
+        asked = {place: self._detector.ask(outlook.view, box) for place, box in enumerate(boxes)}
+        return list(side_by_side(asked).values())
 
-    def weigh(self, outlook: Outlook, detection: Detection, box: BoundingBox) -> Sighting:
-        """Return a detection around a box, measured, with all that speaks for it."""
-        return at_once(self._ask(outlook, detection, box.moved_to(detection.center)))
+    def weigh(self, outlook: Outlook, seen: Sequence[Detection],
+              boxes: Sequence[BoundingBox]) -> list[Sighting]:
+        """Return detections around boxes, measured, with all that speaks for them."""
+        asked = {place: self._ask(outlook, detection, box.moved_to(detection.center))
+                 for place, (detection, box) in enumerate(zip(seen, boxes, strict=True))}
+        return list(side_by_side(asked).values())
 
     def presence(self, outlook: Outlook, boxes: Sequence[BoundingBox]) -> list[float | None]:
         """Return the log-odds that the target is in each box; None where nothing measures."""
@@ -208,8 +212,9 @@ class Observer:
 
     def follow_distractors(self, outlook: Outlook) -> None:
         """Watch the known distractors, or they get away from their places and look new."""
-        for place in self._distractors.places:
-            self.is_distractor(outlook, self.detect(outlook, outlook.expected.moved_to(place)))
+        boxes = [outlook.expected.moved_to(place) for place in self._distractors.places]
+        for detection in self.detect(outlook, boxes):
+            self.is_distractor(outlook, detection)
 
     def keep(self, view: FrameView, box: BoundingBox) -> None:
         """Keep a frame in which the target is certain, to see later what stood beside it."""
@@ -222,8 +227,9 @@ class Observer:
     def _resembles(self, view: FrameView, box: BoundingBox) -> bool:
         """Return whether a frame shows something like the target in a box."""
         outlook = Outlook(view, box, box, box)
-        seen = self._detector.near(self.detect(outlook, box), box.center)
-        return self._monitor.resembles(self.weigh(outlook, seen, box).assessment.evidence)
+        seen = [self._detector.near(found, box.center) for found in self.detect(outlook, [box])]
+        [sighting] = self.weigh(outlook, seen, [box])
+        return self._monitor.resembles(sighting.assessment.evidence)
 
 
 def _told(measured: Measurement | None,

@@ -16,10 +16,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 import math
 
 from lmsco_ros.core.config import SearchConfig
-from lmsco_ros.core.detection.detector import Detection
 from lmsco_ros.core.imaging.view import FrameView
 from lmsco_ros.core.presence.monitor import PresenceMonitor
 from lmsco_ros.core.presence.observer import Observer, Outlook, Sighting
@@ -99,18 +99,15 @@ class Redetection:
         """Return what is at salient places and in slices, at the price of several frames."""
         chosen = self._schedule.salient(outlook.misses)
         places = self._salient(outlook, self._schedule.candidates) if chosen else []
-        seen = [self._look_at(outlook, box) for box in places[chosen.start:chosen.stop]]
-        sharpest = self._tiles(outlook, here, slices)
-        return seen + ([] if sharpest is None else [self._look_again(outlook, sharpest)])
+        return self._look_at(outlook, [*places[chosen.start:chosen.stop],
+                                       *self._sharpest(outlook, here, slices)])
 
     def _sparing(self, outlook: Outlook, here: Sighting) -> list[Sighting]:
         """Return what is where the turn is, if anything is: it costs little more than a frame."""
         turn = self._schedule.turn(outlook.misses)
         if turn is Turn.TILES:
-            sharpest = self._tiles(outlook, here, 1)
-            if sharpest is None or not self._monitor.hints(sharpest.sharpness):
-                return []
-            return [self._look_again(outlook, sharpest)]
+            return self._look_at(outlook, self._sharpest(
+                outlook, here, 1, self._monitor.hints))
         chosen = self._schedule.measured(outlook.misses)
         places = self._salient(outlook, _MANY) if chosen else []
         if turn is Turn.ANYWHERE:
@@ -120,7 +117,7 @@ class Redetection:
             reach = _NEAR * outlook.expected.area**0.5
             places = [box for box in places if math.dist(box.center, center) < reach]
         best = self._most_present(outlook, places[:len(chosen)])
-        return [] if best is None else [self._look_at(outlook, best)]
+        return [] if best is None else self._look_at(outlook, [best])
 
     def _most_present(self, outlook: Outlook, places: list[BoundingBox]) -> BoundingBox | None:
         """Return the place that the network takes for the target, or the first without one."""
@@ -134,18 +131,19 @@ class Redetection:
         scales = _CUT_SCALES if self._monitor.after_cut else (1.0,)
         return self._salience.candidates(outlook.view, outlook.expected, count, scales)
 
-    def _tiles(self, outlook: Outlook, here: Sighting, slices: int) -> Detection | None:
-        """Return the sharpest detection in the regions whose turn it is."""
-        places = self._schedule.tiles(outlook.view.size, here.detection.region.width,
-                                      outlook.expected.center, slices)
-        found = [self._observer.detect(outlook, outlook.expected.moved_to(place))
-                 for place in places]
-        return max(found, key=lambda detection: detection.sharpness, default=None)
+    def _sharpest(self, outlook: Outlook, here: Sighting, slices: int,
+                  wanted: Callable[[float], bool] = lambda sharpness: True) -> list[BoundingBox]:
+        """
+        Return where the filter sees most in the regions whose turn it is, if that is wanted.
 
-    def _look_again(self, outlook: Outlook, found: Detection) -> Sighting:
-        """Return what is at a detection: the window of its tile dims what lies off the center."""
-        return self._look_at(outlook, outlook.expected.moved_to(found.center))
+        It has to look there again: the window of a region dims what lies off its center.
+        """
+        regions = [outlook.expected.moved_to(place) for place in self._schedule.tiles(
+            outlook.view.size, here.detection.region.width, outlook.expected.center, slices)]
+        seen = [one for one in self._observer.detect(outlook, regions) if wanted(one.sharpness)]
+        sharpest = sorted(seen, key=lambda detection: -detection.sharpness)[:1]
+        return [outlook.expected.moved_to(detection.center) for detection in sharpest]
 
-    def _look_at(self, outlook: Outlook, box: BoundingBox) -> Sighting:
-        """Return what is around a box."""
-        return self._observer.weigh(outlook, self._observer.detect(outlook, box), box)
+    def _look_at(self, outlook: Outlook, boxes: list[BoundingBox]) -> list[Sighting]:
+        """Return what is around boxes."""
+        return self._observer.weigh(outlook, self._observer.detect(outlook, boxes), boxes)

@@ -40,15 +40,18 @@ class Detector:
     """Sees the next of what it is told to see; near a place, something at that place."""
 
     def __init__(self):
-        self.next, self.calls, self.neared = [], [], []
+        self.next, self.calls, self.neared, self.passes = [], [], [], []
 
     def __call__(self, view, box, factors=(1.0,)):
         self.calls.append((view, box, factors))
         return self.next.pop(0) if self.next else seen(box.center)
 
-    def ask(self, view, box, factors):
-        return (yield Ask('detector', lambda turns: [self(*turn) for turn in turns],
-                          (view, box, factors)))
+    def ask(self, view, box, factors=(1.0,)):
+        return (yield Ask('detector', self.answers, (view, box, factors)))
+
+    def answers(self, turns):
+        self.passes.append(len(turns))
+        return [self(*turn) for turn in turns]
 
     def likeness(self, detection):
         return detection.likeness
@@ -210,7 +213,7 @@ def test_what_is_not_measured_keeps_its_size(detector, monitor, entering):
 
 def test_what_is_found_elsewhere_reaches_to_no_border(observer, entering):
     box = BoundingBox(5, 70, 12, 20)
-    assert observer.weigh(entering, seen(box.center), box).found == box
+    assert [one.found for one in observer.weigh(entering, [seen(box.center)], [box])] == [box]
 
 
 def test_new_detector_is_measured_by_its_own_first_frame(observer, monitor, outlook):
@@ -227,14 +230,25 @@ def test_odds_of_zero_are_odds(observer, meter, outlook):
     assert look(observer, outlook).assessment.evidence.presence == 0.0
 
 
-def test_detection_elsewhere_is_weighed_in_its_own_box(observer, detector, meter, outlook):
-    box = BoundingBox.from_center((200, 150), (14, 11))
-    found = observer.detect(outlook, box)
-    assert detector.calls == [(outlook.view, box, (1.0,))]
-    sighting = observer.weigh(outlook, found, box)
-    assert (sighting.found, sighting.detection) == (box, found)
-    assert meter.calls == [(outlook.view, box)]
-    assert sighting.assessment.evidence.jump == pytest.approx(np.hypot(90, 66) / 20)
+def test_detections_elsewhere_are_weighed_in_their_own_boxes(observer, detector, meter, outlook):
+    boxes = [BoundingBox.from_center((200, 150), (14, 11)), BoundingBox(20, 30, 10, 16)]
+    found = observer.detect(outlook, boxes)
+    assert detector.calls == [(outlook.view, box, (1.0,)) for box in boxes]
+    meter.odds = [2.0, -1.0]
+    sightings = observer.weigh(outlook, found, boxes)
+    assert [sighting.found for sighting in sightings] == boxes
+    assert [sighting.detection for sighting in sightings] == found
+    assert meter.calls == [(outlook.view, box) for box in boxes]
+    evidence = [sighting.assessment.evidence for sighting in sightings]
+    assert evidence[0].jump == pytest.approx(np.hypot(90, 66) / 20)
+    assert [one.presence for one in evidence] == [2.0, -1.0]
+
+
+def test_networks_see_all_places_in_one_pass(observer, detector, meter, outlook):
+    boxes = [LAST, EXPECTED, LAST.moved_to(TWIN)]
+    observer.weigh(outlook, observer.detect(outlook, boxes), boxes)
+    assert detector.passes == meter.passes == [3]
+    assert observer.weigh(outlook, observer.detect(outlook, []), []) == []
 
 
 @pytest.fixture
