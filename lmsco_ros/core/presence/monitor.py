@@ -48,8 +48,8 @@ _STANDING_OUT = 0.6
 _DOUBTED = 0.5
 # Score of a frame that shows nothing, where nothing stood out at the start.
 _NOTHING = 0.2
-# Belief that speaks neither for a target nor against it, in the long run; and log-odds against it,
-# in as many frames as lead to LOST, that do so even if it is believed; no frame has more.
+# Belief that speaks neither for a target nor against it, in the long run; and log-odds against it
+# in each of as many frames as lead to LOST, that do so whatever is believed.
 _LASTING, _WEARING = 0.4, 2.0
 
 # Part of the sharpness that convinces, of a target that is not in the middle of its region.
@@ -209,22 +209,28 @@ class PresenceMonitor:
                 or self._worn_out(seen) or self._doubtful and seen.score < _NOTHING)
 
     def _worn_out(self, seen: Assessment) -> bool:
-        """Return whether too much has spoken against the target, frame by frame, for too long."""
-        return self._against_with(seen) >= _WEARING * self.config.lost_frames
+        """Return whether too much has spoken against the target, in two frames or in many."""
+        return self._against_with(seen) >= self._enough
 
     def _against_with(self, seen: Assessment) -> float:
         """
         Return what speaks against the target after a frame: a cumulative sum of log-odds.
 
         As in the test of Page (1954), which is never below 0; of belief and network, the one that
-        doubts more. What is lost has nothing left to be worn out.
+        doubts more, but no frame has more than half of what is enough. What is lost has nothing
+        left to be worn out.
         """
         if self._state is TrackState.LOST:
             return 0.0
         against = log_odds(_LASTING) - log_odds(seen.belief)
         if seen.evidence.presence is not None:
             against = max(against, -seen.evidence.presence)
-        return max(0.0, self._against + min(against, _WEARING))
+        return max(0.0, self._against + min(against, 0.5 * self._enough))
+
+    @property
+    def _enough(self) -> float:
+        """What speaks against a target until it is lost."""
+        return _WEARING * self.config.lost_frames
 
     def _needs_another(self, seen: Assessment) -> bool:
         """

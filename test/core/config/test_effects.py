@@ -149,12 +149,12 @@ def scored(score, quality=1.0, likeness=0.5):
     return 20 * quality, likeness, 1, math.exp(odds / MEASURED.vagueness), 0
 
 
-# Clear frames, sharper and sharper ones; fading, half back, and gone; then, for a moment each,
+# Clear frames, sharper and sharper ones; fading, half back, missed, and gone; then, for a moment each,
 # what is not sharp, not alike, or not quite enough; at last the target.
 STORY = [Evidence(*hints) for hints in (
     *3 * [(10, 1, 4, .06, 0)], *6 * [(20, 1, 4, .06, 0)], *3 * [(10, 1, 4, .06, 0)],
     scored(.45), scored(.3), scored(.55), scored(.2), (10, 1, 4, .06, 0),
-    *4 * [(1, 0, -5, .2, 0)], (3, .3, -2, .15, 0), (2, .3, -2, .12, 0), *3 * [(1, 0, -5, .2, 0)],
+    *4 * [(3, 0, 0, .2, 0)], (3, .3, -2, .15, 0), (2, .3, -2, .12, 0), *3 * [(1, 0, -5, .2, 0)],
     (5, 1.2, 8, .05, 2), (20, .28, 6, .05, 2), scored(.6, .45, .35), (14, 1, 4, .06, 2))]
 
 

@@ -114,17 +114,27 @@ def test_state_does_not_flicker_between_two_thresholds(monitor):
     assert judge(monitor, between).state is TrackState.TRACKING
 
 
+def missed(monitor):
+    """Return evidence that is not believed, and says little against the target."""
+    return at_score(monitor, 0.15)
+
+
 def test_target_is_lost_after_enough_misses_in_a_row(monitor):
-    assert not believable(monitor, GONE)
-    states = [judge(monitor, GONE).state for _ in range(4)]
+    assert not believable(monitor, missed(monitor))
+    states = [judge(monitor, missed(monitor)).state for _ in range(4)]
     assert states == [TrackState.UNCERTAIN] * 2 + [TrackState.LOST] * 2
 
 
 def test_misses_must_be_in_a_row(monitor):
     for _ in range(5):
-        assert judge(monitor, GONE).state is not TrackState.LOST
-        assert judge(monitor, GONE).state is not TrackState.LOST
+        assert judge(monitor, missed(monitor)).state is not TrackState.LOST
+        assert judge(monitor, missed(monitor)).state is not TrackState.LOST
         assert judge(monitor, CLEAR).state is TrackState.TRACKING
+
+
+def test_target_is_lost_in_the_second_frame_that_shows_nothing_of_it(monitor):
+    states = [judge(monitor, GONE).state for _ in range(3)]
+    assert states == [TrackState.UNCERTAIN] + [TrackState.LOST] * 2
 
 
 def test_target_is_lost_after_lasting_doubt(monitor):
@@ -143,11 +153,10 @@ def test_target_is_lost_where_the_network_denies_it_for_long(monkeypatch, monito
     assert TrackState.LOST not in states[:8] and states[8] is TrackState.LOST
 
 
-def test_no_frame_speaks_against_the_target_like_several(monitor):
+def test_one_frame_alone_does_not_lose_the_target_whatever_speaks_against_it(monitor):
     believed = monitor.assess(CLEAR)
     denied = replace(believed, evidence=replace(believed.evidence, presence=-100.0))
-    assert [monitor.judge(denied).state is TrackState.LOST for _ in range(3)] == [
-        False, False, True]
+    assert [monitor.judge(denied).state is TrackState.LOST for _ in range(2)] == [False, True]
 
 
 @pytest.mark.parametrize('doubt', [
@@ -231,7 +240,7 @@ def test_monitor_that_always_learns_believes_everything_and_still_judges():
     judge(monitor, CLEAR)
     states = []
     for _ in range(3):
-        verdict = judge(monitor, GONE)
+        verdict = judge(monitor, missed(monitor))
         states.append(verdict.state)
         assert verdict.believed and verdict.learns
     assert states == [TrackState.UNCERTAIN] * 2 + [TrackState.LOST]
@@ -393,14 +402,14 @@ def test_new_monitor_tracks_and_has_seen_no_cut():
     monitor = PresenceMonitor(CONFIG)
     assert monitor.state is TrackState.TRACKING and not monitor.after_cut
     states = [judge(monitor, NOTHING).state for _ in range(3)]
-    assert states == [TrackState.UNCERTAIN] * 2 + [TrackState.LOST]
+    assert states == [TrackState.UNCERTAIN] + [TrackState.LOST] * 2
 
 
 def test_missed_frame_counts_from_zero_after_the_target_was_seen(monitor):
-    judge(monitor, GONE)
-    judge(monitor, GONE)
+    judge(monitor, missed(monitor))
+    judge(monitor, missed(monitor))
     judge(monitor, CLEAR)
-    states = [judge(monitor, GONE).state for _ in range(3)]
+    states = [judge(monitor, missed(monitor)).state for _ in range(3)]
     assert states == [TrackState.UNCERTAIN] * 2 + [TrackState.LOST]
 
 

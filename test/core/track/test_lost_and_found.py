@@ -14,10 +14,13 @@
 
 """What is said while the target is away, beside another one, or after a closed shutter."""
 
+from itertools import islice
+
 import numpy as np
 import pytest
 
 from lmsco_ros.core import BoundingBox, LMSCOTracker, TrackerConfig, TrackState
+from lmsco_ros.synthetic import render_story, SceneConfig
 
 CONFIG = TrackerConfig.from_dict({
     'features': [{'channels': [{'kind': 'hog'}, {'kind': 'intensity'}], 'cell': 4}],
@@ -114,6 +117,19 @@ def test_walker_who_vanishes_slowly_behind_a_wall_is_found_in_the_old_size(walke
         states.append(result.state)
     assert TrackState.LOST in states and states[-1] is TrackState.TRACKING
     assert result.box.overlap(BoundingBox(*places[-1], 18, 41)) > 0.7
+
+
+@pytest.mark.parametrize('seed', [3, 6])
+def test_walker_whom_a_truck_hides_is_lost_though_something_is_seen_there(seed):
+    scene = SceneConfig(width=320, height=256, frames=300, fps=10.0, seed=seed)
+    first, *rest = islice(render_story(scene), 110, 240)
+    tracker = LMSCOTracker()
+    tracker.initialize(first.image, first.box)
+    told = [tracker.update(frame.image) for frame in rest]
+    hidden = [result.state for frame, result in zip(rest, told) if frame.visible < 0.1]
+    assert hidden.count(TrackState.LOST) > len(hidden) / 2 and TrackState.TRACKING not in hidden
+    assert told[-1].state is TrackState.TRACKING
+    assert told[-1].box.overlap(rest[-1].box) > 0.6
 
 
 def test_target_that_got_away_behind_the_shutter_is_found_with_the_second_frame(scene):
