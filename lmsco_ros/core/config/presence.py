@@ -42,8 +42,9 @@ class PresenceConfig:
         Probability that the target is there, even in a part, below which a frame is not
         believed.
     lost_frames : int
-        Frames in a row that are not believed until the state is LOST; it also is when less
-        doubt lasts for longer.
+        Frames in a row that are not believed until the state is LOST, at the latest: two are
+        enough where all speaks against the target, and many where a little does, even if they
+        are believed.
     found : float
         Score from which a target is found again, or found where it was not expected; shortly
         after a cut a high probability that a part of it is there will do.
