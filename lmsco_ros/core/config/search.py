@@ -31,9 +31,11 @@ class SearchConfig:
     Attributes
     ----------
     candidates : int
-        Salient places.
+        Salient places while the target is missing for a short time; half as many, rounded up,
+        are measured in every other frame when it is missing for longer.
     tiles : int
-        Other regions, which cover the whole image in the course of frames.
+        Other regions, which cover the whole image in the course of frames; in the other frames
+        when it is missing for longer.
 
     """
 
