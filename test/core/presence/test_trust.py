@@ -14,6 +14,8 @@
 
 """The probability that a detection is the target."""
 
+import math
+
 from hypothesis import given, strategies as st
 import numpy as np
 import pytest
@@ -21,7 +23,7 @@ import pytest
 from lmsco_ros.core.config import PresenceConfig
 from lmsco_ros.core.presence.evidence import Evidence
 from lmsco_ros.core.presence.monitor import PresenceMonitor
-from lmsco_ros.core.presence.trust import MEASURED, trust, UNMEASURED
+from lmsco_ros.core.presence.trust import log_odds, MEASURED, trust, UNMEASURED
 from lmsco_ros.core.types import TrackState
 
 
@@ -130,3 +132,15 @@ def test_noise_that_is_new_in_each_frame_is_lost_at_once(monitor):
     monitor.start(noise)
     later = Evidence(4.0, 0.2, -2.0, 0.18)
     assert state_after(monitor, later, PresenceConfig().lost_frames) is TrackState.LOST
+
+
+@pytest.mark.parametrize('probability, odds', [
+    (0.5, 0.0), (0.8, math.log(4)), (0.2, -math.log(4)), (1e-3, -math.log(999))])
+def test_log_odds_are_those_of_a_probability(probability, odds):
+    assert log_odds(probability) == pytest.approx(odds, abs=1e-12)
+
+
+@pytest.mark.parametrize('probability', [0.0, 1.0])
+def test_log_odds_of_certainty_are_finite(probability):
+    assert 9 < abs(log_odds(probability)) < 10
+    assert (log_odds(probability) > 0) == (probability > 0.5)
