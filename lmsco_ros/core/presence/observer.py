@@ -176,7 +176,7 @@ class Observer:
         return box if self._meter is None else outlook.come_in(box)
 
     def detect(self, outlook: Outlook, boxes: Sequence[BoundingBox]) -> list[Detection]:
-        """Return what the filter sees around boxes, each in its size; the networks see them all."""
+        """Return what the filter sees around boxes, each in its size, in one pass."""
         asked = {place: self._detector.ask(outlook.view, box) for place, box in enumerate(boxes)}
         return list(side_by_side(asked).values())
 

@@ -232,13 +232,15 @@ def test_odds_of_zero_are_odds(observer, meter, outlook):
 
 def test_detections_elsewhere_are_weighed_in_their_own_boxes(observer, detector, meter, outlook):
     boxes = [BoundingBox.from_center((200, 150), (14, 11)), BoundingBox(20, 30, 10, 16)]
-    found = observer.detect(outlook, boxes)
+    detector.next = [seen((200, 150)), seen((27, 40))]
+    seen_there = observer.detect(outlook, boxes)
     assert detector.calls == [(outlook.view, box, (1.0,)) for box in boxes]
     meter.odds = [2.0, -1.0]
-    sightings = observer.weigh(outlook, found, boxes)
-    assert [sighting.found for sighting in sightings] == boxes
-    assert [sighting.detection for sighting in sightings] == found
-    assert meter.calls == [(outlook.view, box) for box in boxes]
+    sightings = observer.weigh(outlook, seen_there, boxes)
+    found = [boxes[0], BoundingBox(22, 32, 10, 16)]
+    assert [sighting.found for sighting in sightings] == found
+    assert [sighting.detection for sighting in sightings] == seen_there
+    assert meter.calls == [(outlook.view, box) for box in found]
     evidence = [sighting.assessment.evidence for sighting in sightings]
     assert evidence[0].jump == pytest.approx(np.hypot(90, 66) / 20)
     assert [one.presence for one in evidence] == [2.0, -1.0]
