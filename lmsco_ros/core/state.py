@@ -43,8 +43,11 @@ _START_SIZE = 0.02
 # Squared distance of a measurement, in deviations, from which it continues no motion.
 _JUMP = 25.0
 # Errors of center and size that all measurements share, and none averages out: those of the box
-# at the start, and of the filter that holds on to it.
+# at the start, and of what holds on to it. In sides where nothing measures edges; otherwise in
+# deviations of these. With them .77 and .97 of the edges are within one and two deviations on
+# clips that the network never saw, and .63 and .88 in rendered sequences.
 _LASTING = np.array([0.055, 0.055, 0.15, 0.15])
+_LASTING_OF_EDGES = np.array([0.8, 0.8, 1.8, 1.8])
 
 _FRAMES_PER_SECOND = 30.0
 
@@ -151,6 +154,7 @@ class TargetState:
     _covariance: _Array
 
     def __init__(self, box: BoundingBox) -> None:
+        self._lasting = _LASTING
         self._start(box, np.zeros((2, 2)))
 
     @property
@@ -177,7 +181,7 @@ class TargetState:
         width, height = np.exp(self._mean[_SIZE]).tolist()
         pixels = np.array([1.0, 1.0, width, height])
         covariance = self._covariance[:4, :4] * (pixels * pixels[:, None])
-        covariance.flat[::5] += (_LASTING * (width, height, width, height))**2
+        covariance.flat[::5] += (self._lasting * (width, height, width, height))**2
         return covariance
 
     def predict(self, frames: float) -> None:
@@ -189,7 +193,8 @@ class TargetState:
         self._mean = move @ self._mean
         self._covariance = _symmetric(move @ self._covariance @ move.T) + self._noise(frames)
 
-    def measure(self, box: BoundingBox, covariance: npt.NDArray[np.float64]) -> None:
+    def measure(self, box: BoundingBox, covariance: npt.NDArray[np.float64],
+                edges: npt.NDArray[np.float64] | None = None) -> None:
         """
         Take where the target was seen.
 
@@ -202,8 +207,14 @@ class TargetState:
         covariance : ndarray, shape (2, 2) or (4, 4)
             Of its center, or of center x, center y, width and height, in px^2; without the size
             only the center is taken.
+        edges : ndarray, shape (2,), optional
+            Deviations of the measured edges along x and y in px: the less exactly they are seen,
+            the larger are the errors that no further measurement averages out. None where
+            nothing measures edges.
 
         """
+        self._lasting = (_LASTING if edges is None else
+                         _LASTING_OF_EDGES * np.tile(edges / box.size, 2))
         count = len(covariance)
         measured, noise = _measurement(box, covariance)
         surprise = measured - self._mean[:count]

@@ -138,7 +138,8 @@ class Track:
         if verdict.believed:
             merged = neighbors is not None and neighbors.merged(self._box.area**0.5)
             self._follow(view, self._fused(view, sighting), verdict.state, merged)
-            self.course.measure(self._box, box_covariance(sighting.detection, self._box))
+            self.course.measure(self._box, box_covariance(sighting.detection, self._box),
+                                sighting.measurement)
         else:
             self.course.missed(sighting.found if verdict.promising else None)
             if verdict.state is TrackState.LOST:

@@ -127,6 +127,26 @@ def test_covariance_is_symmetric_and_positive(steps):
         assert np.array_equal(told, told.T) and np.linalg.eigvalsh(told).min() > 0
 
 
+def test_errors_that_last_are_as_large_as_the_edges_are_unsure():
+    state, edges = TargetState(START), np.array([3.0, 0.5])
+    state.predict(1.0)
+    state.measure(START, EXACT, edges)
+    lasting = np.diag([0.8 * 3.0, 0.8 * 0.5, 1.8 * 3.0, 1.8 * 0.5])**2
+    np.testing.assert_allclose(state.covariance, lasting, atol=0.1)
+    # Of what is not seen for a while they remain, in its sides; what measures no edges has others.
+    state.predict(1e-9)
+    np.testing.assert_allclose(state.covariance, lasting, atol=0.1)
+    state.measure(START, EXACT)
+    np.testing.assert_allclose(state.covariance, LASTING, atol=0.1)
+
+
+def test_errors_that_last_are_known_after_a_jump():
+    state = TargetState(START)
+    state.predict(1.0)
+    state.measure(START.moved_to((500, 400)), EXACT, np.array([3.0, 3.0]))
+    assert state.covariance[0, 0] == pytest.approx((0.8 * 3)**2, abs=0.1)
+
+
 @given(frames=st.lists(step, min_size=1, max_size=20))
 def test_covariance_grows_while_nothing_is_measured(frames):
     state = followed()

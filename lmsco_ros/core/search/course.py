@@ -23,6 +23,7 @@ import math
 import numpy as np
 import numpy.typing as npt
 
+from lmsco_ros.core.extent.measurement import Measurement
 from lmsco_ros.core.imaging.regions import clamp_box, visible_part
 from lmsco_ros.core.search.prediction import Prediction
 from lmsco_ros.core.state import FrameClock, TargetState
@@ -96,9 +97,11 @@ class Course:
         self._sizes.append(box.size)
         self._prediction.seen(box.center, merged)
 
-    def measure(self, box: BoundingBox, covariance: npt.NDArray[np.float64]) -> None:
+    def measure(self, box: BoundingBox, covariance: npt.NDArray[np.float64],
+                measured: Measurement | None) -> None:
         """Take the box, with the covariance of what was measured, into the motion."""
-        self._motion.measure(box, covariance)
+        edges = None if measured is None else measured.deviations.mean(axis=1)
+        self._motion.measure(box, covariance, edges)
 
     def missed(self, promise: BoundingBox | None) -> None:
         """Take note of a frame without the target, or of a place that may have shown it."""

@@ -14,10 +14,12 @@
 
 """Where a target is expected, and how large."""
 
+import numpy as np
 import pytest
 
+from lmsco_ros.core.extent.measurement import Measurement
 from lmsco_ros.core.search.course import Course
-from lmsco_ros.core.types import BoundingBox
+from lmsco_ros.core.types import BoundingBox, TrackResult, TrackState
 
 IMAGE = (200, 100)
 
@@ -61,3 +63,21 @@ def test_lost_target_that_is_found_is_expected_as_it_is_found():
     course.lost()
     course.follow(BoundingBox.from_center((90, 40), (18, 30)))
     assert course.expected(IMAGE).size == pytest.approx((18, 30))
+
+
+def told(measured):
+    """Return the covariance of a box at rest that was measured so."""
+    course, box = Course(BoundingBox(40, 25, 20, 30), None), BoundingBox(40, 25, 20, 30)
+    course.next_frame(None)
+    course.measure(box, 0.01 * np.eye(4), measured)
+    said = TrackResult(box, 1.0, TrackState.TRACKING, np.zeros((4, 4), np.float32), box)
+    return course.describe(said, IMAGE).covariance
+
+
+def test_what_is_told_is_as_unsure_as_the_edges_along_either_axis():
+    edges = np.array([[40.0, 60.0], [25.0, 55.0]])
+    covariance = told(Measurement(edges, np.array([[1.0, 3.0], [5.0, 5.0]]), 3.0))
+    # Eight tenths of the mean deviation of both edges, and as good as nothing beside that.
+    assert np.sqrt(covariance[0, 0]) == pytest.approx(0.8 * 2, abs=0.05)
+    assert np.sqrt(covariance[1, 1]) == pytest.approx(0.8 * 5, abs=0.05)
+    assert np.sqrt(told(None)[0, 0]) == pytest.approx(0.055 * 20, abs=0.05)
