@@ -149,7 +149,7 @@ def scored(score, quality=1.0, likeness=0.5):
     return 20 * quality, likeness, 1, math.exp(odds / MEASURED.vagueness), 0
 
 
-# Clear frames, sharper and sharper ones; fading, half back, missed, and gone; then, for a moment each,
+# Clear frames, sharper and sharper ones; fading, half back, missed, gone; then, for a moment each,
 # what is not sharp, not alike, or not quite enough; at last the target.
 STORY = [Evidence(*hints) for hints in (
     *3 * [(10, 1, 4, .06, 0)], *6 * [(20, 1, 4, .06, 0)], *3 * [(10, 1, 4, .06, 0)],
