@@ -316,9 +316,16 @@ def test_wrong_time_changes_nothing(parts, track):
 
 def test_motion_takes_what_is_followed_with_how_exactly_it_was_seen(parts, track):
     advance(track, frame())
-    (box, covariance), = (made.args for made in parts.motion.measure.call_args_list)
+    (box, covariance, edges), = (made.args for made in parts.motion.measure.call_args_list)
     assert box.size == pytest.approx(START.size) and box.center == pytest.approx((52, 36))
     assert covariance == (HERE.detection, box)
+    assert list(edges) == list(HERE.measurement.deviations.mean(axis=1))
+
+
+def test_motion_is_not_told_of_edges_where_nothing_is_measured(parts, track):
+    parts.observer.look.return_value = Seen(replace(HERE, measurement=None))
+    advance(track, frame())
+    assert parts.motion.measure.call_args.args[2] is None
 
 
 @pytest.mark.parametrize('moved, told', [
