@@ -193,6 +193,10 @@ class TargetState:
         self._mean = move @ self._mean
         self._covariance = _symmetric(move @ self._covariance @ move.T) + self._noise(frames)
 
+    def carry(self, shift: npt.NDArray[np.float64]) -> None:
+        """Take note that all of the view has moved by a shift (x, y) in pixels."""
+        self._mean[_PLACE] += shift
+
     def measure(self, box: BoundingBox, covariance: npt.NDArray[np.float64],
                 edges: npt.NDArray[np.float64] | None = None) -> None:
         """

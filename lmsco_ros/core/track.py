@@ -125,9 +125,10 @@ class Track:
         self._monitor.note_noise(condition.noise)
         if condition.cut:
             self._expect_nothing(view)
+        self.course.look_around(frame)
         known = others and not condition.cut
         neighbors = Neighbors(self.course.heading, tuple(others)) if known else None
-        outlook = Outlook(view, self._box, self.course.expected(view.size),
+        outlook = Outlook(view, self.course.last, self.course.expected(view.size),
                           self.course.predicted, neighbors, self.course.misses)
         sighting = yield from self._look(outlook)
         if self._after_shutter or not self._monitor.believable(sighting.assessment):

@@ -177,7 +177,8 @@ class TrackResult:
         Covariance of center x, center y, width and height of `predicted_box`, in px^2.
     predicted_box : BoundingBox or None
         The target in this frame by its motion and what was measured: close to `box` while the
-        target is seen, and where it has gone on to meanwhile, as far as one can tell, when not.
+        target is seen, and where it has gone on to meanwhile, as far as one can tell, when not;
+        what the camera does otherwise than before carries it.
     velocity_covariance : ndarray, shape (2, 2), or None
         Covariance of `velocity`, in the square of its unit.
     note : str

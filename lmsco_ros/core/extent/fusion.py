@@ -35,15 +35,17 @@ _Array = npt.NDArray[np.float64]
 
 # In sides of the target: the error of a box that a person draws, and that of the correlation
 # filter's center.
-_DRAWN, _FOUND = 0.08, 0.08
+_DRAWN, _FOUND = 0.08, 0.12
 # The change of a side from one frame to the next, and what comes to it while a border of the image
 # cuts the target.
-_CHANGE, _CHANGE_AT_BORDER = 0.02, 0.15
+_CHANGE, _CHANGE_AT_BORDER = 0.05, 0.15
 _DRAWN_PIXELS = 0.7
-# What a measurement differs from the expectation without telling of a change, in squared
-# deviations over sides: a person has drawn the first box after a convention of his own, and the
-# less sure a measurement is, the more of its error is the same in every frame.
-_CONVENTION = 8.0
+# What a measurement differs from the expectation without telling of a change. In pixels: a person
+# has drawn the first box after a convention of his own. In squared deviations over sides, where
+# these are larger than those of an edge that is seen as sharply as pixels allow: it is not clear
+# what belongs to the target, a neighbor that touches it or what it wears, and a box that followed
+# would be taken for the target the next time, and grow on.
+_CONVENTION, _UNCLEAR, _SHARP_PIXELS = 0.3, 12.0, 2.0
 # Frames in which the whole of a target that came in over the border shows how large it is, and how
 # that is drawn.
 _SETTLING = 100
@@ -101,7 +103,9 @@ class EdgeFilter:
         predicted = _predicted(found, size)
         self._whole += not cut.any()
         noise = measured.deviations**2
-        differing = _beyond(measured.edges - edges, settled * _CONVENTION * noise / side)
+        unclear = np.maximum(0.0, noise - _SHARP_PIXELS**2) / side
+        differing = _beyond(measured.edges - edges,
+                            settled * (_CONVENTION + _UNCLEAR * unclear))
         gain = predicted @ np.linalg.inv(predicted + noise[:, :, None] * np.eye(2))
         fused = edges + (gain @ differing[:, :, None])[:, :, 0]
         self._covariances = predicted - gain @ predicted

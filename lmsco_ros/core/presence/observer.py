@@ -46,7 +46,7 @@ class Outlook:
     view : FrameView
         The frame.
     last : BoundingBox
-        The target where it was seen last.
+        The target where it was seen last, in the view of this frame.
     expected : BoundingBox
         Where it is expected in this frame.
     predicted : BoundingBox

@@ -24,7 +24,9 @@ import numpy as np
 import numpy.typing as npt
 
 from lmsco_ros.core.extent.measurement import Measurement
+from lmsco_ros.core.imaging.gain import FrameSurvey
 from lmsco_ros.core.imaging.regions import clamp_box, visible_part
+from lmsco_ros.core.search.camera import CameraMotion
 from lmsco_ros.core.search.prediction import Prediction
 from lmsco_ros.core.state import FrameClock, TargetState
 from lmsco_ros.core.types import BoundingBox, TrackResult
@@ -58,8 +60,8 @@ class Course:
 
     def __init__(self, box: BoundingBox, time: float | None) -> None:
         self._clock, self._motion = FrameClock(time), TargetState(box)
-        self._prediction = Prediction()
-        self._box = box
+        self._prediction, self._camera = Prediction(), CameraMotion()
+        self._box, self._moment = box, 0.0
         self._sizes = deque([box.size], maxlen=_BEFORE)
         self._promise: BoundingBox | None = None
 
@@ -75,6 +77,11 @@ class Course:
         return self._prediction.misses
 
     @property
+    def last(self) -> BoundingBox:
+        """The target where it was seen last, in the view of now."""
+        return self._box
+
+    @property
     def predicted(self) -> BoundingBox:
         """The target where its motion has led it; its center may lie outside of the image."""
         return self._motion.box
@@ -85,7 +92,18 @@ class Course:
 
     def next_frame(self, time: float | None) -> None:
         """Go on to the next frame; TimeError as :meth:`check_time`."""
-        self._motion.predict(self._clock.step(time))
+        passed = self._clock.step(time)
+        self._moment += passed
+        self._motion.predict(passed)
+
+    def look_around(self, frame: FrameSurvey) -> None:
+        """Carry a target that is not seen with what the camera does otherwise than before."""
+        shift = self._camera.observe(frame, self._moment, followed=not self.misses)
+        if not shift.any():
+            return
+        self._motion.carry(shift)
+        self._box = _carried(self._box, shift)
+        self._promise = self._promise and _carried(self._promise, shift)
 
     def expected(self, image_size: tuple[int, int]) -> BoundingBox:
         """Return where the target is expected next: where the last frame may have shown it."""
@@ -115,6 +133,7 @@ class Course:
     def forget(self, image_size: tuple[int, int]) -> None:
         """Take note that the view has changed: the target may be anywhere, at rest."""
         self._prediction.stop()
+        self._camera.forget()
         self._motion.forget_place(image_size)
         self._promise = None
 
@@ -126,3 +145,9 @@ class Course:
             result, velocity=(rate * x, rate * y), covariance=motion.covariance,
             predicted_box=visible_part(clamp_box(motion.box, image_size), image_size),
             velocity_covariance=rate**2 * motion.velocity_covariance)
+
+
+def _carried(box: BoundingBox, shift: npt.NDArray[np.float64]) -> BoundingBox:
+    """Return a box that has moved by (x, y) pixels."""
+    x, y = (shift + box.center).tolist()
+    return box.moved_to((x, y))

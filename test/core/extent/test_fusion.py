@@ -51,15 +51,15 @@ def test_fusion_is_the_dense_kalman_update():
     drawn = (0.08 * side)**2 + 0.7**2
     blocks = []
     for _ in range(2):
-        size = 2 * drawn + (0.02 * side)**2
-        center = (0.08 * side)**2
+        size = 2 * drawn + (0.05 * side)**2
+        center = (0.12 * side)**2
         map_to_edges = np.array([[1, -0.5], [1, 0.5]])
         blocks.append(map_to_edges @ np.diag([center, size]) @ map_to_edges.T)
     prior = np.block([[blocks[0], np.zeros((2, 2))], [np.zeros((2, 2)), blocks[1]]])
     noise = np.diag(deviations.ravel()**2)
     expected = np.array([100.0, 140, 80, 110])
     difference = np.array([90.0, 150, 85, 105]) - expected
-    convention = 8 * deviations.ravel()**2 / side
+    convention = 0.3 + 12 * np.maximum(0, deviations.ravel()**2 - 2**2) / side
     difference = np.sign(difference) * np.maximum(0, abs(difference) - convention)
     gain = prior @ np.linalg.inv(prior + noise)
     right = expected + gain @ difference
@@ -81,6 +81,14 @@ def test_sure_measurements_are_followed_at_once():
 def test_unsure_measurements_leave_the_size():
     box, _ = run(BoundingBox(100, 80, 12, 12), BoundingBox(98, 78, 16, 16), 5.0, frames=100)
     assert box.size == pytest.approx((12, 12))
+
+
+def test_what_is_unclear_keeps_the_size():
+    """Two that touch are measured as one, with edges that are unsure for their size."""
+    both = BoundingBox(95, 78, 50, 34)
+    unclear, clear = (run(BOX, both, deviation, frames=100)[0] for deviation in (5.0, 2.0))
+    assert unclear.as_tuple() == pytest.approx(BOX.as_tuple())
+    assert clear.overlap(both) > 0.95
 
 
 def test_what_a_convention_explains_is_no_change():
@@ -143,7 +151,7 @@ def test_variances_decide_where_filter_and_network_differ_on_the_center():
     moved = BOX.moved_to((124.0, 95.0))
     sure, unsure = (EdgeFilter(BOX, IMAGE)(BOX, measured(moved, deviation))
                     for deviation in (0.2, 20.0))
-    assert sure.center[0] == pytest.approx(124, abs=0.2)
+    assert sure.center[0] == pytest.approx(124, abs=0.35)
     assert unsure.center[0] == pytest.approx(120, abs=0.2)
 
 
@@ -159,11 +167,11 @@ def test_fused_boxes_have_sides_and_covariances_are_positive(x, y, width, height
 
 
 @given(st.floats(0.2, 5))
-def test_unit_of_length_does_not_matter_but_for_pixels_of_drawing(scale):
-    """Twice as large in an image twice as large is twice the result, as far as pixels go."""
+def test_unit_of_length_does_not_matter_before_a_convention_is_known(scale):
+    """Twice as large in an image twice as large is twice the result."""
     def fused(factor):
         fuse = EdgeFilter(BOX.scaled(1.0), IMAGE)
-        fuse._covariances = fuse._covariances * factor**2
+        fuse._covariances, fuse._whole = fuse._covariances * factor**2, 0
         place = BoundingBox(*(factor * value for value in BOX.as_tuple()))
         larger = BoundingBox(*(factor * value for value in (90.0, 70.0, 60.0, 50.0)))
         fuse._image_size = tuple(factor * side + 50 for side in IMAGE)

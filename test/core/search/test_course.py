@@ -65,6 +65,45 @@ def test_lost_target_that_is_found_is_expected_as_it_is_found():
     assert course.expected(IMAGE).size == pytest.approx((18, 30))
 
 
+class Turning:
+    """A camera whose view moves by (4, -2) more than before in each frame without the target."""
+
+    def __init__(self):
+        self.asked = []
+
+    def observe(self, frame, moment, *, followed):
+        self.asked.append((frame, moment, followed))
+        return np.zeros(2) if followed else np.array([4.0, -2.0])
+
+
+def test_target_that_is_not_seen_goes_with_the_view():
+    course = vanishing([20, 20])
+    course._camera = camera = Turning()
+    before = course.predicted.center
+    course.next_frame(None)
+    course.look_around('seen')
+    assert course.last.center == (50, 40) and course.predicted.center == before
+    course.missed(BoundingBox.from_center((53, 41), (20, 30)))
+    course.next_frame(None)
+    course.look_around('hidden')
+    assert course.last.center == pytest.approx((54, 38))
+    assert course.predicted.center == pytest.approx((54, 38))
+    # The place that may have shown it has moved, too.
+    assert course.expected(IMAGE).center == pytest.approx((57, 39))
+    assert camera.asked == [('seen', 1, True), ('hidden', 2, False)]
+    course.missed(None)
+    assert course.expected(IMAGE).center == pytest.approx((54, 38))
+
+
+def test_camera_is_told_how_many_frames_have_passed():
+    course = Course(BoundingBox(40, 25, 20, 30), 7.0)
+    course._camera = camera = Turning()
+    for time in (7 + 1 / 30, 7 + 4 / 30):
+        course.next_frame(time)
+        course.look_around('seen')
+    assert [moment for _, moment, _ in camera.asked] == pytest.approx([1, 4])
+
+
 def told(measured):
     """Return the covariance of a box at rest that was measured so."""
     course, box = Course(BoundingBox(40, 25, 20, 30), None), BoundingBox(40, 25, 20, 30)

@@ -75,6 +75,22 @@ def test_target_that_jumps_where_nothing_was_is_followed(scene):
     assert results[-1].box.center == pytest.approx(elsewhere, abs=1.0)
 
 
+def test_place_of_a_hidden_target_is_carried_by_the_camera(scene):
+    """The camera pans from the third frame on in which the target is hidden."""
+    tracker = started(scene, resting(scene), count=12)
+    ways = np.maximum(0.0, 1.2 * (np.arange(35) - 2))
+    for way in ways:
+        result = tracker.update(scene.frame(pan=(1.2 + way, way / 4)))
+    there = (START[0] + ways[-1], START[1] + ways[-1] / 4)
+    assert result.state is TrackState.LOST
+    assert result.predicted_box.center == pytest.approx(there, abs=4.0)
+    assert result.box.center == pytest.approx(START, abs=1.0)
+    found = [tracker.update(scene.frame(there, SIZE, pan=(1.2 + ways[-1] + n / 10, ways[-1] / 4)))
+             for n in range(8)][-1]
+    assert found.state is TrackState.TRACKING
+    assert found.box.center == pytest.approx(there, abs=1.0)
+
+
 def test_target_of_another_view_is_found_soon(scene, make_scene):
     other, elsewhere = make_scene((240, 160), 5), (START[0] + 110, START[1] + 40)
     tracker = started(scene, resting(scene))
