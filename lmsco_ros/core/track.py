@@ -138,7 +138,7 @@ class Track:
         verdict = self._monitor.judge(sighting.assessment)
         if verdict.believed:
             merged = neighbors is not None and neighbors.merged(self._box.area**0.5)
-            self._follow(view, self._fused(view, sighting), verdict.state, merged)
+            self._follow(view, self._fused(view, sighting, merged), verdict.state, merged)
             self.course.measure(self._box, box_covariance(sighting.detection, self._box),
                                 sighting.measurement)
         else:
@@ -170,10 +170,10 @@ class Track:
         """Return what is where the target is expected."""
         return (yield from self._observer.look(outlook, scale_factors(self._config.scale)))
 
-    def _fused(self, view: FrameView, sighting: Sighting) -> BoundingBox:
-        """Return the box at a sighting, in the size that was searched and measured there."""
+    def _fused(self, view: FrameView, sighting: Sighting, merged: bool) -> BoundingBox:
+        """Return the box at a sighting, in the size that was searched, and measured of it alone."""
         box = sighting.sized(self._config.scale)
-        if sighting.measurement is not None:
+        if sighting.measurement is not None and not merged:
             box = self._extent(box, sighting.measurement)
         return clamp_box(box, view.size)
 
