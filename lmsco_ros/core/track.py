@@ -171,7 +171,7 @@ class Track:
         return (yield from self._observer.look(outlook, scale_factors(self._config.scale)))
 
     def _fused(self, view: FrameView, sighting: Sighting, merged: bool) -> BoundingBox:
-        """Return the box at a sighting, in the size that was searched, and measured of it alone."""
+        """Return the box at a sighting, in the size that was searched, or measured of it alone."""
         box = sighting.sized(self._config.scale)
         if sighting.measurement is not None and not merged:
             box = self._extent(box, sighting.measurement)

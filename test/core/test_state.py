@@ -127,16 +127,6 @@ def test_covariance_is_symmetric_and_positive(steps):
         assert np.array_equal(told, told.T) and np.linalg.eigvalsh(told).min() > 0
 
 
-def test_view_that_moves_carries_the_place_and_nothing_else():
-    state = followed()
-    box, velocity, (_, covariance) = state.box, state.velocity, whole(state)
-    covariance = np.copy(covariance)
-    state.carry(np.array([30.0, -4.0]))
-    assert state.box.as_tuple() == pytest.approx((box.x + 30, box.y - 4, box.width, box.height))
-    assert state.velocity == velocity
-    np.testing.assert_array_equal(whole(state)[1], covariance)
-
-
 def test_errors_that_last_are_as_large_as_the_edges_are_unsure():
     state, edges = TargetState(START), np.array([3.0, 0.5])
     state.predict(1.0)

@@ -111,6 +111,7 @@ def test_constants_of_the_fusion_are_those_of_the_code():
         'drawn': fusion._DRAWN, 'drawn pixels': fusion._DRAWN_PIXELS, 'found': fusion._FOUND,
         'change': fusion._CHANGE,
         'border': fusion._CHANGE_AT_BORDER, 'convention': fusion._CONVENTION,
+        'unclear': fusion._UNCLEAR, 'sharp': fusion._SHARP_PIXELS,
         'settling': fusion._SETTLING, 'anchoring': fusion._ANCHORING,
         'outgrown': track._OUTGROWN, 'sure': track._SURE}
     assert f'{regions._BORDER_PIXELS} pixels away' in PAGE

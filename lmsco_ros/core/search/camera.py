@@ -58,8 +58,8 @@ class _Picture:
     moment: float
     pattern: npt.NDArray[np.float32]
 
-    def way_to(self, other: _Picture) -> _Vector:
-        """Return what the background has moved in another picture, in pixels of both."""
+    def way_to(self, other: _Picture) -> _Vector | None:
+        """Return what the background has moved in another picture; None if it tells nothing."""
         return background_motion(_equalized(self.pattern), _equalized(other.pattern))
 
 
@@ -103,11 +103,13 @@ class CameraMotion:
         if followed or not before:
             self._usual = None
             return np.zeros(2)
-        first, last = before[0], before[-1]
         if self._usual is None:
-            self._usual = first.way_to(last) / max(1.0, last.moment - first.moment)
-        way = last.way_to(now) - (now.moment - last.moment) * self._usual
-        return way * (frame.image.shape[1] / frame.probe.shape[1])
+            self._usual = _rate(before[0], before[-1])
+        way = before[-1].way_to(now)
+        if way is None:
+            return np.zeros(2)
+        beyond = way - (moment - before[-1].moment) * self._usual
+        return beyond * (frame.image.shape[1] / frame.probe.shape[1])
 
     def forget(self) -> None:
         """Take note that the view has changed at once."""
@@ -115,7 +117,8 @@ class CameraMotion:
         self._usual = None
 
 
-def background_motion(before: npt.NDArray[np.uint8], now: npt.NDArray[np.uint8]) -> _Vector:
+def background_motion(before: npt.NDArray[np.uint8],
+                      now: npt.NDArray[np.uint8]) -> _Vector | None:
     """
     Return by how much what most of a picture shows has moved.
 
@@ -130,21 +133,27 @@ def background_motion(before: npt.NDArray[np.uint8], now: npt.NDArray[np.uint8])
 
     Returns
     -------
-    ndarray, shape (2,)
-        Its motion (x, y) in pixels; 0 where too few corners are found again, or do not agree.
+    ndarray, shape (2,), or None
+        Its motion (x, y) in pixels; None where too few corners are found again, or agree.
 
     """
     corners = cv2.goodFeaturesToTrack(before, _CORNERS, _STRENGTH, _APART)
     if before.shape != now.shape or corners is None:
-        return np.zeros(2)
+        return None
     moved, found, _ = cv2.calcOpticalFlowPyrLK(
         before, now, corners, corners.copy(), winSize=(_WINDOW, _WINDOW), maxLevel=_HALVINGS)
     ways = (moved - corners)[found == 1].astype(np.float64)
     if len(ways) < _ENOUGH:
-        return np.zeros(2)
+        return None
     way = np.median(ways, axis=0)
     agreeing = np.abs(ways - way).max(axis=1) < _AGREEING
-    return way if agreeing.sum() >= _ENOUGH else np.zeros(2)
+    return way if agreeing.sum() >= _ENOUGH else None
+
+
+def _rate(first: _Picture, last: _Picture) -> _Vector:
+    """Return what the background moves in a frame, from two pictures; 0 if it tells nothing."""
+    way = first.way_to(last)
+    return np.zeros(2) if way is None else way / max(1.0, last.moment - first.moment)
 
 
 def _equalized(pattern: npt.NDArray[np.float32]) -> npt.NDArray[np.uint8]:
