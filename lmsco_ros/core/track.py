@@ -137,8 +137,10 @@ class Track:
         self._after_shutter = False
         verdict = self._monitor.judge(sighting.assessment)
         if verdict.believed:
-            merged = neighbors is not None and neighbors.merged(self._box.area**0.5)
-            self._follow(view, self._fused(view, sighting, merged), verdict.state, merged)
+            side = self._box.area**0.5
+            alone = neighbors is None or not neighbors.touched(side)
+            self._follow(view, self._fused(view, sighting, alone), verdict.state,
+                         merged=neighbors is not None and neighbors.merged(side))
             self.course.measure(self._box, box_covariance(sighting.detection, self._box),
                                 sighting.measurement)
         else:
@@ -170,10 +172,10 @@ class Track:
         """Return what is where the target is expected."""
         return (yield from self._observer.look(outlook, scale_factors(self._config.scale)))
 
-    def _fused(self, view: FrameView, sighting: Sighting, merged: bool) -> BoundingBox:
-        """Return the box at a sighting, in the size that was searched, or measured of it alone."""
+    def _fused(self, view: FrameView, sighting: Sighting, alone: bool) -> BoundingBox:
+        """Return the box at a sighting, as large as was searched, and measured if it is alone."""
         box = sighting.sized(self._config.scale)
-        if sighting.measurement is not None and not merged:
+        if sighting.measurement is not None and alone:
             box = self._extent(box, sighting.measurement)
         return clamp_box(box, view.size)
 

@@ -35,16 +35,16 @@ _Array = npt.NDArray[np.float64]
 
 # In sides of the target: the error of a box that a person draws, and that of the correlation
 # filter's center.
-_DRAWN, _FOUND = 0.08, 0.12
+_DRAWN, _FOUND = 0.08, 0.2
 # The change of a side from one frame to the next, and what comes to it while a border of the image
 # cuts the target.
 _CHANGE, _CHANGE_AT_BORDER = 0.05, 0.15
 _DRAWN_PIXELS = 0.7
-# What a measurement differs from the expectation without telling of a change. In pixels: a person
-# has drawn the first box after a convention of his own. In squared deviations over sides, where
-# these are larger than those of an edge that is seen as sharply as pixels allow: it is not clear
-# what belongs to the target, a neighbor that touches it or what it wears, and a box that followed
-# would be taken for the target the next time, and grow on.
+# By how much an edge differs from the expectation, and not as the other one does, without telling
+# of a change. In pixels: a person has drawn the first box after a convention of his own. In
+# squared deviations over sides, where these are larger than those of an edge that is seen as
+# sharply as pixels allow: it is not clear what belongs to the target, a neighbor that touches it
+# or what it wears, and a box that followed would be taken for the target next, and grow on.
 _CONVENTION, _UNCLEAR, _SHARP_PIXELS = 0.3, 12.0, 2.0
 # Frames in which the whole of a target that came in over the border shows how large it is, and how
 # that is drawn.
@@ -104,10 +104,11 @@ class EdgeFilter:
         self._whole += not cut.any()
         noise = measured.deviations**2
         unclear = np.maximum(0.0, noise - _SHARP_PIXELS**2) / side
-        differing = _beyond(measured.edges - edges,
-                            settled * (_CONVENTION + _UNCLEAR * unclear))
+        spared = settled * (_CONVENTION + _UNCLEAR * unclear)
+        moved = measured.edges - edges
+        told = _shared(moved) + _beyond(moved - _shared(moved), spared)
         gain = predicted @ np.linalg.inv(predicted + noise[:, :, None] * np.eye(2))
-        fused = edges + (gain @ differing[:, :, None])[:, :, 0]
+        fused = edges + (gain @ told[:, :, None])[:, :, 0]
         self._covariances = predicted - gain @ predicted
         return _box(fused)
 
@@ -136,6 +137,12 @@ def place_to_learn(found: tuple[float, float], fused: BoundingBox,
     unsure = measured.deviations.mean(axis=1) / _side(fused)
     x, y = np.array(found) + (np.array(fused.center) - found) / (1 + (unsure / _ANCHORING)**2)
     return float(x), float(y)
+
+
+def _shared(moved: _Array) -> _Array:
+    """Return how far both edges along an axis have moved to the same side, shape (2, 1)."""
+    low, high = moved.min(axis=1, keepdims=True), moved.max(axis=1, keepdims=True)
+    return np.maximum(low, 0.0) + np.minimum(high, 0.0)
 
 
 def _beyond(difference: _Array, spared: _Array) -> _Array:

@@ -28,6 +28,8 @@ _Point = tuple[float, float]
 _REACH = 0.75
 # How near to each other targets are of which nobody can tell what is whose, in the same.
 _MERGED = 0.5
+# How near targets are that may be measured as one.
+_TOUCHING = 1.25
 
 
 @dataclass(frozen=True)
@@ -54,7 +56,16 @@ class Neighbors:
 
     def merged(self, side: float) -> bool:
         """Return whether another target gets to the same place; a side has `side` pixels."""
-        return bool(self._distances(np.array(self.own)).min() < _MERGED * side)
+        return self._nearest < _MERGED * side
+
+    def touched(self, side: float) -> bool:
+        """Return whether another target gets so near that what is measured may be of both."""
+        return self._nearest < _TOUCHING * side
+
+    @property
+    def _nearest(self) -> float:
+        """How far the nearest of the others is, in pixels."""
+        return float(self._distances(np.array(self.own)).min())
 
     def owned(self, places: np.ndarray) -> np.ndarray:
         """Return which of the places, shape (..., 2), are expected to be the target's."""

@@ -46,27 +46,29 @@ def test_fusion_is_the_dense_kalman_update():
     """Of the state (x0, x1, y0, y1), all at once, with the covariances written out."""
     fuse = EdgeFilter(BOX, IMAGE)
     deviations = np.array([[1.0, 2.0], [0.5, 3.0]])
-    seen = BoundingBox(90, 85, 60, 20)
     side = BOX.area**0.5
     drawn = (0.08 * side)**2 + 0.7**2
     blocks = []
     for _ in range(2):
         size = 2 * drawn + (0.05 * side)**2
-        center = (0.12 * side)**2
+        center = (0.2 * side)**2
         map_to_edges = np.array([[1, -0.5], [1, 0.5]])
         blocks.append(map_to_edges @ np.diag([center, size]) @ map_to_edges.T)
     prior = np.block([[blocks[0], np.zeros((2, 2))], [np.zeros((2, 2)), blocks[1]]])
     noise = np.diag(deviations.ravel()**2)
     expected = np.array([100.0, 140, 80, 110])
-    difference = np.array([90.0, 150, 85, 105]) - expected
+    difference = np.array([90.0, 150, 88, 124]) - expected
     convention = 0.3 + 12 * np.maximum(0, deviations.ravel()**2 - 2**2) / side
-    difference = np.sign(difference) * np.maximum(0, abs(difference) - convention)
+    # Along x the edges have moved apart, along y both of them down, by 8 at least.
+    shared = np.array([0.0, 0, 8, 8])
+    difference = difference - shared
+    difference = shared + np.sign(difference) * np.maximum(0, abs(difference) - convention)
     gain = prior @ np.linalg.inv(prior + noise)
     right = expected + gain @ difference
-    box = fuse(BOX, Measurement(np.array([[90.0, 150], [85, 105]]), deviations, 1.0))
+    box = fuse(BOX, Measurement(np.array([[90.0, 150], [88, 124]]), deviations, 1.0))
     assert box.as_tuple() == pytest.approx(
         (right[0], right[2], right[1] - right[0], right[3] - right[2]))
-    assert seen.width > box.width > BOX.width
+    assert 60 > box.width > BOX.width and 90 > box.y > BOX.y
     posterior = prior - gain @ prior
     assert fuse._covariances[0] == pytest.approx(posterior[:2, :2])
     assert fuse._covariances[1] == pytest.approx(posterior[2:, 2:])
@@ -89,6 +91,15 @@ def test_what_is_unclear_keeps_the_size():
     unclear, clear = (run(BOX, both, deviation, frames=100)[0] for deviation in (5.0, 2.0))
     assert unclear.as_tuple() == pytest.approx(BOX.as_tuple())
     assert clear.overlap(both) > 0.95
+
+
+@pytest.mark.parametrize('shift', [3.0, -3.0])
+def test_what_moves_as_a_whole_moves_where_its_extent_is_unclear(shift):
+    moved = BOX.moved_to((BOX.center[0] + shift, BOX.center[1]))
+    box, _ = run(BOX, moved, 5.0, frames=1)
+    assert box.size == pytest.approx(BOX.size)
+    assert 0.5 < (box.x - BOX.x) / shift < 1
+    assert box.y == pytest.approx(BOX.y)
 
 
 def test_what_a_convention_explains_is_no_change():
@@ -150,7 +161,7 @@ def test_size_at_the_border_changes_faster():
 def test_variances_decide_where_filter_and_network_differ_on_the_center():
     moved = BOX.moved_to((124.0, 95.0))
     sure, unsure = (EdgeFilter(BOX, IMAGE)(BOX, measured(moved, deviation))
-                    for deviation in (0.2, 20.0))
+                    for deviation in (0.2, 60.0))
     assert sure.center[0] == pytest.approx(124, abs=0.35)
     assert unsure.center[0] == pytest.approx(120, abs=0.2)
 

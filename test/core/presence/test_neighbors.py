@@ -63,6 +63,12 @@ def test_targets_that_get_to_the_same_place_are_merged(other, merged):
     assert Neighbors((10, 10), ((90, 90), other)).merged(20) is merged
 
 
+@pytest.mark.parametrize('other, touched', [
+    ((34, 10), True), ((36, 10), False), ((10, -14), True)])
+def test_targets_that_may_be_measured_as_one_touch(other, touched):
+    assert Neighbors((10, 10), ((90, 90), other)).touched(20) is touched
+
+
 class Detector:
     """Sees the next of what it is told to see; near a place, something at that place."""
 
