@@ -20,6 +20,7 @@ import numpy as np
 import pytest
 
 from lmsco_ros.core import BoundingBox, LMSCOTracker, TrackerConfig, TrackState
+from lmsco_ros.core.search.redetection import Redetection
 from lmsco_ros.synthetic import render_story, SceneConfig
 
 CONFIG = TrackerConfig.from_dict({
@@ -75,8 +76,15 @@ def test_target_that_jumps_where_nothing_was_is_followed(scene):
     assert results[-1].box.center == pytest.approx(elsewhere, abs=1.0)
 
 
-def test_place_of_a_hidden_target_is_carried_by_the_camera(scene):
+def test_place_of_a_hidden_target_is_carried_by_the_camera(scene, monkeypatch):
     """The camera pans from the third frame on in which the target is hidden."""
+    search, searched = Redetection.__call__, []
+
+    def watched(self, outlook, here, **how):
+        searched.append(outlook.last.center)
+        return search(self, outlook, here, **how)
+
+    monkeypatch.setattr(Redetection, '__call__', watched)
     tracker = started(scene, resting(scene), count=12)
     ways = np.maximum(0.0, 1.2 * (np.arange(35) - 2))
     for way in ways:
@@ -84,6 +92,7 @@ def test_place_of_a_hidden_target_is_carried_by_the_camera(scene):
     there = (START[0] + ways[-1], START[1] + ways[-1] / 4)
     assert result.state is TrackState.LOST
     assert result.predicted_box.center == pytest.approx(there, abs=4.0)
+    assert searched[-1] == pytest.approx(there, abs=4.0)
     assert result.box.center == pytest.approx(START, abs=1.0)
     found = [tracker.update(scene.frame(there, SIZE, pan=(1.2 + ways[-1] + n / 10, ways[-1] / 4)))
              for n in range(8)][-1]
