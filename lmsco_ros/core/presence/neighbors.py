@@ -28,8 +28,9 @@ _Point = tuple[float, float]
 _REACH = 0.75
 # How near to each other targets are of which nobody can tell what is whose, in the same.
 _MERGED = 0.5
-# How near targets are that may be measured as one.
-_TOUCHING = 1.25
+# How near targets are that may be measured as one: the extent network sees one and a half sides
+# around a target.
+_TOUCHING = 1.5
 
 
 @dataclass(frozen=True)

@@ -64,7 +64,7 @@ def test_targets_that_get_to_the_same_place_are_merged(other, merged):
 
 
 @pytest.mark.parametrize('other, touched', [
-    ((34, 10), True), ((36, 10), False), ((10, -14), True)])
+    ((39, 10), True), ((41, 10), False), ((10, -19), True)])
 def test_targets_that_may_be_measured_as_one_touch(other, touched):
     assert Neighbors((10, 10), ((90, 90), other)).touched(20) is touched
 
